@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
@@ -12,12 +13,14 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
-from paramove.action_space.video_tracker import TrackedState
 from paramove.cameras import WORLD_FRAME
 from paramove.documents import Floats
 from paramove.msgs.action_estimate_pb2 import ActionEstimate, ActionParameter, Location
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.observation import BENT_POSE_POINTS, HAND
+
+if TYPE_CHECKING:
+    from paramove.action_space.video_tracker import TrackedState
 
 NAMES_IN_MESSAGES = {"shoulder": "shoulder", "elbow": "elbow", "hand": "index", "wrist": "wrist"}
 

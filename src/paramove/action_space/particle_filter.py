@@ -21,9 +21,9 @@ class FilterOptions:
     """How many particles, and when they are resampled.
 
     Attributes:
-        n_particles: 400 in the thesis.
+        n_particles: 400 in the thesis; `action_tracker` passes its parameter `particles`.
         resample_below: particles are resampled when their effective number is below this fraction of them; otherwise
-            they keep their weights, which loses less. 1.0 selects in every frame, as the thesis does.
+            they keep their weights, which loses less. 1.0 resamples in every frame, as the thesis does.
         min_effective: if a likelihood leaves fewer effective particles than this fraction, it is flattened until it
             leaves that many: with several views it is sharper than 400 particles are dense. 0 never flattens.
         evidence_rate_hz: frames that follow each other faster are not independent (the same shadow misleads all of
@@ -49,7 +49,7 @@ class FilterOptions:
 
     @classmethod
     def thesis(cls) -> FilterOptions:
-        """Selection in every frame, likelihoods as they are."""
+        """Resampling in every frame, likelihoods as they are."""
         return cls(resample_below=1.0, min_effective=0.0, evidence_rate_hz=float("inf"))
 
     def independence(self, elapsed_s: float) -> float:

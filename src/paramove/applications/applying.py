@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from paramove.applications.options import Place
-from paramove.applications.stage import ApplicationState, Stage, cm
+from paramove.applications.stage import HAND_TIMEOUT_S, ApplicationState, Stage, cm
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
@@ -17,7 +17,6 @@ NEAR = 0.035
 CLEARER_BY = 0.015
 """The second nearest object must be so much farther away, m."""
 HAND_AWAY_S = 0.3
-HAND_TIMEOUT_S = 6.0
 SETTLED_S = 1.0
 """An object must have stood this long to be pointed at: before, the hand has just put it there."""
 

@@ -7,7 +7,7 @@ and its own targets give the homography.
 from __future__ import annotations
 
 from paramove.applications.options import Place
-from paramove.applications.stage import ApplicationState, Stage, cm
+from paramove.applications.stage import HAND_TIMEOUT_S, ApplicationState, Stage, cm
 from paramove.applications.table import Sighting
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
@@ -111,7 +111,8 @@ class Calibrating(Stage):
             self._ask()
 
     def _letting_go(self) -> None:
-        if (self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S and self.for_s > 1.0) or self.for_s > 6.0:
+        away = self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S and self.for_s > 1.0
+        if away or self.for_s > HAND_TIMEOUT_S:
             target = self.app.goals.position(self._corner)
             self.app.goal_client.start(RelocationGoal.KIND_PLACE_HELD, self.app.now_s, self._held, target=target)
             self.go("placing")

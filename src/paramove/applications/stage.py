@@ -12,6 +12,9 @@ from paramove.applications.table import Table
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 
+HAND_TIMEOUT_S = 6.0
+"""The robot waits for the hand to leave at most this long: what looks like a hand may be none."""
+
 _log = logging.getLogger(__name__)
 
 

@@ -18,7 +18,6 @@ from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
-from scipy.spatial.transform import Rotation
 
 from paramove.documents import Floats, Image, InputError, read_document, replacing
 
@@ -134,6 +133,8 @@ class CalibratedCamera:
 
     def to_foxglove(self, world_frame: str = WORLD_FRAME) -> tuple[CameraCalibration, FrameTransform]:
         """The standard messages of lens and pose. Raises InputError for a lens that they cannot represent."""
+        from scipy.spatial.transform import Rotation  # half a second, which only messages should cost
+
         if len(self.distortion) not in _MODELS:
             raise InputError(
                 f"camera {self.name!r}: {len(self.distortion)} distortion coefficients have no name in the message; "
@@ -154,6 +155,8 @@ class CalibratedCamera:
     @classmethod
     def from_foxglove(cls, calibration: CameraCalibration, pose: FrameTransform) -> CalibratedCamera:
         """The camera of two standard messages, `pose` being its pose in the world. Raises InputError."""
+        from scipy.spatial.transform import Rotation
+
         if calibration.D and calibration.distortion_model not in _MODELS.values():
             raise InputError(
                 f"camera {calibration.frame_id!r}: distortion model {calibration.distortion_model!r} found, "

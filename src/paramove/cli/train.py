@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -18,6 +17,7 @@ from paramove.cli.demos_options import SetArgument, ended, words
 from paramove.cli.evaluation_io import PROGRESS
 from paramove.cli.model_options import INTERRUPTED, one_line
 from paramove.documents import InputError, printable
+from paramove.training import DEFAULT_FRAMES, DEFAULT_STATES, Kind
 
 if TYPE_CHECKING:
     from paramove.training import Examples, Make, Trained
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 app = typer.Typer(add_completion=False)
 
 FOLDER = Path("models")
-Kind = StrEnum("Kind", ["best", "linear", "quadratic", "cubic", "neural", "interpolative"])
 LeaveOut = Literal["theta", "subject", "none"]
 
 
@@ -37,10 +36,12 @@ def train(
     parameters: Annotated[
         str | None, typer.Option(metavar="NAMES", help="those that are learned (default: all that vary)")
     ] = None,
-    states: Annotated[int, typer.Option(min=1, max=500, help="number of states")] = 20,
-    d_min: Annotated[int | None, typer.Option("--d-min", min=1, help="smallest frames in a state")] = None,
-    d_max: Annotated[int | None, typer.Option("--d-max", min=1, help="most frames in a state")] = None,
-    frames: Annotated[int, typer.Option(min=5, max=2000, help="every movement is brought to so many")] = 100,
+    states: Annotated[int, typer.Option(min=1, max=500, help="number of states")] = DEFAULT_STATES,
+    d_min: Annotated[int | None, typer.Option("--d-min", min=1, help="minimum frames in a state")] = None,
+    d_max: Annotated[int | None, typer.Option("--d-max", min=1, help="maximum frames in a state")] = None,
+    frames: Annotated[
+        int, typer.Option(min=5, max=2000, help="every movement is resampled to this many")
+    ] = DEFAULT_FRAMES,
     residuals: Annotated[
         Literal["correlated", "independent"] | None,
         typer.Option(help="whether whole performances are modelled, or frames as in the thesis"),

@@ -46,8 +46,6 @@ from .reaching import demonstrations_at as demonstrations_at
 from .reaching import grasp_states as grasp_states
 from .reaching import reaching_cuboid as reaching_cuboid
 from .reaching import reaching_grid_demonstrations as reaching_grid_demonstrations
-from .reaching import table_place as table_place
-from .reaching import table_targets as table_targets
 from .reaching import train_reaching_model as train_reaching_model
 from .recorded_people import RATE_HZ as RATE_HZ
 from .recorded_people import RecordedMovement as RecordedMovement
@@ -73,6 +71,8 @@ from .synthetic import kept_clear as kept_clear
 from .synthetic import leaning as leaning
 from .synthetic import minimum_jerk as minimum_jerk
 from .synthetic import overreach as overreach
+from .synthetic import table_place as table_place
+from .synthetic import table_targets as table_targets
 from .synthetic import usual_elbow as usual_elbow
 from .synthetic_set import synthetic_takes as synthetic_takes
 from .timing import resampled as resampled

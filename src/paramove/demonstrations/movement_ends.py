@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from paramove.demonstrations.arm import POINT_NAMES, ArmLengths
-from paramove.demonstrations.reaching import table_targets
 from paramove.demonstrations.synthetic import (
     RESTING_SHOULDER,
     SAMPLE_RATE_HZ,
     Action,
     Demonstrator,
     Timing,
+    table_targets,
 )
 from paramove.documents import Floats, Ints
 
@@ -72,6 +71,8 @@ class Person:
     def observed(self, action: Action, target: Floats, rng: np.random.Generator) -> tuple[Floats, tuple[float, float]]:
         """One movement to `target` (3,), m, in the models' frame: body points (T, 7, 3) at 60 Hz; begin and end, s, of
         its last part."""
+        from scipy.spatial.transform import Rotation  # half a second, which only this method should cost
+
         points = self.demonstrator.demonstrate(action, target, rng).reshape(-1, len(POINT_NAMES), 3)
         shoulder, elbow, wrist, knuckle, index = (
             POINT_NAMES.index(name) for name in ("shoulder", "elbow", "wrist", "knuckle", "index")

@@ -38,23 +38,6 @@ def reaching_cuboid() -> ParameterGrid:
     return ParameterGrid.from_lines([x + 0.29, x + 0.50], [y - 0.345, y + 0.25], [z - 0.285, z - 0.15])
 
 
-def table_targets(columns: int, rows: int, height: float = 0.07) -> tuple[Floats, Floats]:
-    """A grid over 80 x 30 cm of the table (thesis 4.2.1), `height` above it, and its coordinates (u, v) in [0, 1].
-
-    u runs from the person's left to the right, v away from the person. Shapes (M, 3), m, and (M, 2).
-    """
-    u, v = np.meshgrid(np.linspace(0.0, 1.0, columns), np.linspace(0.0, 1.0, rows), indexing="ij")
-    coordinates = np.stack([u, v], axis=-1).reshape(-1, 2)
-    return table_place(coordinates, height), coordinates
-
-
-def table_place(coordinates: ArrayLike, height: float = 0.07) -> Floats:
-    """The position (..., 3), m, of coordinates (u, v) (..., 2) on the table region of `table_targets`."""
-    u, v = np.moveaxis(np.asarray(coordinates, dtype=np.float64), -1, 0)
-    x, y, _ = RESTING_SHOULDER
-    return np.stack([x + 0.20 + 0.30 * v, y + 0.40 - 0.80 * u, np.full_like(u, height)], axis=-1)
-
-
 def demonstrations_at(
     targets: ArrayLike,
     rng: np.random.Generator,

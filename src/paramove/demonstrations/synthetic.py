@@ -163,6 +163,23 @@ ELBOW_AT_COMFORT = RESTING_SHOULDER + np.array([0.045, -0.185, -0.165])
 ELBOW_PER_TARGET = np.array([[0.55, 0.15, 0.00], [0.00, 0.15, 0.00], [0.10, 0.00, 0.25]])
 
 
+def table_targets(columns: int, rows: int, height: float = 0.07) -> tuple[Floats, Floats]:
+    """A grid over 80 x 30 cm of the table (thesis 4.2.1), `height` above it, and its coordinates (u, v) in [0, 1].
+
+    u runs from the person's left to the right, v away from the person. Shapes (M, 3), m, and (M, 2).
+    """
+    u, v = np.meshgrid(np.linspace(0.0, 1.0, columns), np.linspace(0.0, 1.0, rows), indexing="ij")
+    coordinates = np.stack([u, v], axis=-1).reshape(-1, 2)
+    return table_place(coordinates, height), coordinates
+
+
+def table_place(coordinates: ArrayLike, height: float = 0.07) -> Floats:
+    """The position (..., 3), m, of coordinates (u, v) (..., 2) on the table region of `table_targets`."""
+    u, v = np.moveaxis(np.asarray(coordinates, dtype=np.float64), -1, 0)
+    x, y, _ = RESTING_SHOULDER
+    return np.stack([x + 0.20 + 0.30 * v, y + 0.40 - 0.80 * u, np.full_like(u, height)], axis=-1)
+
+
 def usual_elbow(target: Floats) -> Floats:
     """The elbow's preferred position: it follows the target forward, to the left and up, only partly. (3,)."""
     result: Floats = ELBOW_AT_COMFORT + ELBOW_PER_TARGET @ (target - COMFORTABLE_TARGET)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramove.demonstrations.reaching import demonstrations_at, table_targets
-from paramove.demonstrations.synthetic import SAMPLE_RATE_HZ, Action
+from paramove.demonstrations.reaching import demonstrations_at
+from paramove.demonstrations.synthetic import SAMPLE_RATE_HZ, Action, table_targets
 from paramove.demonstrations.writing import Label, Take
 
 SUBJECT = "synthetic"

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from math import inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
@@ -21,7 +22,9 @@ from paramove.documents import Floats, InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.pointing.events import FARTHEST_M
-from paramove.pointing.last_part_model import Judgement, LastPartModel
+
+if TYPE_CHECKING:
+    from paramove.pointing.last_part_model import Judgement, LastPartModel
 
 LENGTHS = (0.6, 0.75, 0.95, 1.2, 1.5)
 """Of the windows that are tried, over the mean duration of the demonstrated last parts."""

@@ -10,6 +10,9 @@ from .examining import confusion as confusion
 from .examining import percent as percent
 from .examples import Examples as Examples
 from .examples import examples_of as examples_of
+from .kinds import DEFAULT_FRAMES as DEFAULT_FRAMES
+from .kinds import DEFAULT_STATES as DEFAULT_STATES
+from .kinds import Kind as Kind
 from .kinds import kind_of as kind_of
 from .kinds import untrained as untrained
 from .movement_writing import ENDINGS as ENDINGS

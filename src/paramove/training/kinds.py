@@ -3,22 +3,36 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
 
-from paramove import phmm
-from paramove.hmm import TrainingOptions
-from paramove.phmm import MovementDescription, ParametricHMM
+from paramove import hmm, phmm
 
-CLASSES = {
-    "best": "QuadraticPHMM",
-    "linear": "LinearPHMM",
-    "quadratic": "QuadraticPHMM",
-    "cubic": "CubicPHMM",
-    "neural": "NeuralPHMM",
-    "interpolative": "InterpolativePHMM",
+if TYPE_CHECKING:
+    from paramove.phmm import MovementDescription, ParametricHMM
+
+
+class Kind(StrEnum):
+    """Names of the models. `best` is the current recommendation: quadratic means with correlated residuals."""
+
+    best = "best"
+    linear = "linear"
+    quadratic = "quadratic"
+    cubic = "cubic"
+    neural = "neural"
+    interpolative = "interpolative"
+
+
+CLASSES: dict[str, str] = {
+    Kind.best: "QuadraticPHMM",
+    Kind.linear: "LinearPHMM",
+    Kind.quadratic: "QuadraticPHMM",
+    Kind.cubic: "CubicPHMM",
+    Kind.neural: "NeuralPHMM",
+    Kind.interpolative: "InterpolativePHMM",
 }
-"""Name -> class. "best" is the current recommendation: quadratic means with correlated residuals."""
 DEFAULT_STATES = 20
+DEFAULT_FRAMES = 100
 
 
 def untrained(
@@ -28,7 +42,7 @@ def untrained(
     n_states: int = DEFAULT_STATES,
     d_min: int | None = None,
     d_max: int | None = None,
-    frames: int = 100,
+    frames: int = DEFAULT_FRAMES,
     residuals: str | None = None,
     floor_deviation: float = 0.0,
 ) -> ParametricHMM:
@@ -45,9 +59,8 @@ def untrained(
 
     Raises ValueError for a kind that is unknown or has no such residuals, and for states that do not fit the frames.
     """
-    if kind not in CLASSES or not hasattr(phmm, CLASSES[kind]):
-        available = [name for name, one in CLASSES.items() if hasattr(phmm, one)]
-        raise ValueError(f"there is no model '{kind}'; there are {', '.join(available)}")
+    if kind not in CLASSES:
+        raise ValueError(f"there is no model '{kind}'; there are {', '.join(CLASSES)}")
     mean = frames / n_states
     if mean < 1.0:
         raise ValueError(f"{frames} frames are fewer than {n_states} states: give more --frames or fewer --states")
@@ -63,7 +76,7 @@ def untrained(
     if arguments and "residuals" not in kind_class._parameter_names():
         raise ValueError(f"a model '{kind}' has no choice of residuals; only linear, quadratic and cubic ones have")
     if floor_deviation:
-        arguments["options"] = TrainingOptions(floor_deviation=floor_deviation)
+        arguments["options"] = hmm.TrainingOptions(floor_deviation=floor_deviation)
     model: ParametricHMM = kind_class(
         n_states, minimum, maximum, resampled_frames=frames, description=description, **arguments
     )

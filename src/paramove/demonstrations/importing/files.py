@@ -22,7 +22,7 @@ READERS: dict[str, Callable[[Path], list[RawTake]]] = {
     ".csv": read_csv,
     ".tsv": read_csv,
 }
-SUFFIXES = (*READERS, ".npz")
+SUFFIXES = (*READERS, ".npz")  # the reader of .npz also returns remarks
 
 
 @dataclass(frozen=True)
