@@ -156,7 +156,7 @@ def test_log_of_events_goes_on_when_there_is_space_again(tmp_path):
             events.write("ready", sentence=str(number))
         filler.unlink()
         events.write("ended", sentence="the last")
-        *whole, cut, last = (disk / "events.jsonl").read_text().splitlines()
+        *whole, _, last = (disk / "events.jsonl").read_text().splitlines()  # what is cut off may be the line's end only
     assert [json.loads(line)["sentence"] for line in whole] == [str(number) for number in range(len(whole))]
-    assert not cut.endswith("}")
+    assert 0 < len(whole) < 199
     assert json.loads(last)["sentence"] == "the last"
