@@ -56,7 +56,7 @@ coverage: setup ## is every line and branch of the safety gate tested? ends with
 	@$(BIN)/python -m coverage run -m pytest -q --durations=0 --durations-min=60 tests/safety $(ARGS)
 	@$(BIN)/python -m coverage report
 
-mutation: setup ## changes the safety gate in thousands of ways: do the tests notice? (build/mutation, 40 minutes)
+mutation: setup ## changes the safety gate in thousands of ways: do the tests notice? (build/mutation, ten minutes or more)
 	rm -rf build/mutation && mkdir -p build/mutation
 	python3 -m venv build/mutation/venv
 	build/mutation/venv/bin/python -m pip install --quiet mutmut==3.8.1

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from paramove.demonstrations.arm import ArmLengths
-from paramove.demonstrations.reaching import table_place
-from paramove.demonstrations.synthetic import RESTING_HAND, RESTING_SHOULDER, Demonstrator, Variation
+from paramove.demonstrations.synthetic import RESTING_HAND, RESTING_SHOULDER, Demonstrator, Variation, table_place
 from sim.persons import actions
 from sim.persons.staging import Stop, staged
 
