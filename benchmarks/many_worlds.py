@@ -29,7 +29,7 @@ from rich.progress import track
 
 from paramove.cameras import Frame, decode, encode
 from paramove.documents import Floats
-from paramove.motion import ClearPlans, MovementSource, NoClearPlanError, SurfaceParameters, plans_for
+from paramove.motion import MotionPlans, MovementSource, NoPlanError, SurfaceParameters, plans_for
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.tracked_objects_pb2 import TrackedObject
@@ -162,7 +162,7 @@ def drawn_measures(seed: int) -> Measures:
 
 
 def examine(
-    seed: int, description: RobotDescription, plans: ClearPlans, placing_error: float, measures: Measures
+    seed: int, description: RobotDescription, plans: MotionPlans, placing_error: float, measures: Measures
 ) -> dict[str, Any]:
     """Faults of one world, and how far off rules and located cylinders are."""
     view = View(seed, description, measures)
@@ -172,7 +172,7 @@ def examine(
         view.close()
 
 
-def _examine(seed: int, view: View, plans: ClearPlans, placing_error: float) -> dict[str, Any]:
+def _examine(seed: int, view: View, plans: MotionPlans, placing_error: float) -> dict[str, Any]:
     draw = np.random.default_rng((seed, 7))
     faults = view.calibrate(lambda: draw.normal(0.0, placing_error, 2))
     if view.calibration is None:
@@ -208,7 +208,7 @@ def _examine(seed: int, view: View, plans: ClearPlans, placing_error: float) -> 
 
 
 def _plan_all(
-    world: Looks, located: dict[str, Any], plans: ClearPlans, draw: np.random.Generator
+    world: Looks, located: dict[str, Any], plans: MotionPlans, draw: np.random.Generator
 ) -> tuple[int, list[str]]:
     """How often an object had to wait for another one, and why no plan is left, if there is none."""
     openings = {item.name: item for item in tool_box.OPENINGS}
@@ -221,9 +221,9 @@ def _plan_all(
         others = np.array([located[other] for other in waiting]).reshape(-1, 2)
         try:
             fetch = plans.fetch(np.array([*located[name], GRASP_Z]), others)
-            plans.deliver(fetch.gripper[-1], np.array([*targets[name], GRASP_Z]), others)
+            plans.deliver(fetch.end, np.array([*targets[name], GRASP_Z]), others)
             stuck = []
-        except NoClearPlanError as error:
+        except NoPlanError as error:
             waiting.append(name)
             where = f"{np.round(located[name] * 100, 1)} to {np.round(targets[name] * 100, 1)} cm"
             stuck.append(f"{name} from {where}: {error}")

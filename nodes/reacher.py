@@ -1,44 +1,47 @@
 """Reacher: does a list of tasks with a servo arm by the learned reaching, one after the other, and ends.
 
-Subscribes  arm/joint_states        foxglove.JointStates    15 Hz   rad
-            arm/safety              SafetyState             15 Hz, latched
-            arm/trajectory_status   TrajectoryStatus        event
-Publishes   arm/trajectory          JointTrajectory         event   rad
-            speech                  Speech                  event
+Subscribes  relocation/status   RelocationStatus   event
+            arm/safety          SafetyState        15 Hz, latched
+Publishes   relocation/goal     RelocationGoal     event   arm_base
+            speech              Speech             event
 """
 
-from pathlib import Path
+from typing import Any
+
+from pydantic import model_validator
 
 from paramove.applications import ReachStep, ReachTask
 from paramove.bus import Bus, NodeConfig, Tick, main, publish_each, topics
-from paramove.motion import MovementSource, ServoArmReaching
-from paramove.robots import RobotDescription
 
-SUBSCRIBES = (topics.ARM_JOINT_STATES, topics.ARM_SAFETY, topics.ARM_TRAJECTORY_STATUS)
-PUBLISHES = (topics.ARM_TRAJECTORY, topics.SPEECH)
+SUBSCRIBES = (topics.RELOCATION_STATUS, topics.ARM_SAFETY)
+PUBLISHES = (topics.RELOCATION_GOAL, topics.SPEECH)
 
 
 class Config(NodeConfig):
-    """`robot`: folder of the arm's description. `tasks`: see `ReachStep`. `movement`: as of the synthesizer."""
+    """`tasks`: see `ReachStep`."""
 
-    robot: Path
     tasks: tuple[ReachStep, ...]
-    movement: MovementSource = MovementSource()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _moved(cls, given: Any) -> Any:
+        moved = sorted({"robot", "movement"} & set(given)) if isinstance(given, dict) else []
+        if moved:
+            raise ValueError(f"found {' and '.join(moved)}, which are parameters of synthesizer: it plans the motions")
+        return given
 
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until all tasks are done, one cannot be done, or the bus closes."""
-    bus.starting("training or reading the reaching movement, and planning the tasks")
-    reaching = ServoArmReaching(RobotDescription.load(config.robot), config.movement.trained())
-    task = ReachTask(reaching, config.tasks, f"reach-{bus.now_ns}")
-    handle = (task.on_joint_states, task.on_safety, task.on_trajectory_status)
+    task = ReachTask(config.tasks, f"reach-{bus.now_ns}")
+    handle = (task.on_goal_status, task.on_safety)
     bus.ready(task.detail)
     for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
             handle[SUBSCRIBES.index(event.topic)](event.message)
             continue
         output = task.tick(event.now_ns)
-        publish_each(bus, PUBLISHES, (output.trajectories, output.speech))
+        publish_each(bus, PUBLISHES, (output.goals, output.speech))
         if task.failure:
             bus.failed(task.failure)
         if task.finished or task.failure:

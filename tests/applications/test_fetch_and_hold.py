@@ -9,6 +9,8 @@ import pytest
 
 from paramove.applications.options import RelocatorOptions
 from paramove.motion.clear_plans import MIN_CLEARANCE, ClearPlans
+from paramove.motion.gripper_arm import GripperArm
+from paramove.motion.planned_motion import RestPose
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.safety.trajectory_check import check_trajectory
 from tests.motion.fake_driver import FAILED, OFFER, PLACE, REJECTED, SUCCEEDED, Cell, FakeDriver, goal
@@ -79,7 +81,9 @@ def test_a_held_object_goes_over_what_stands_in_the_way() -> None:
     check = checker()
     middle = np.column_stack([standing, [check.surface_z + check.cylinder.height / 2]])
     straight = planner().hold(start, place)
-    over = ClearPlans(planner(), check).hold(start, place, standing)
+    over = ClearPlans(GripperArm.of(HOAP3, "right"), planner(), check).hold(
+        RestPose(np.empty(6), start), place, standing
+    )
     near, far = (check.smallest(one.angles, middle, one.holding, every=6).distance for one in (straight, over))
     assert near < 0.0 < MIN_CLEARANCE <= far
     np.testing.assert_allclose(over.gripper[-1], place, rtol=0, atol=1e-6)
@@ -89,8 +93,8 @@ def test_a_held_object_goes_over_what_stands_in_the_way() -> None:
 @pytest.mark.parametrize("place", [*itertools.product((0.13, 0.186), (-0.10, -0.02, 0.065))])
 def test_the_gate_lets_the_way_to_where_the_relocator_holds_it_pass(place: tuple[float, float]) -> None:
     """As the driver samples it, every millisecond, from places all over the working area."""
-    plans = ClearPlans(planner(), checker())
-    lifted = plans.fetch(at(place), np.empty((0, 2))).gripper[-1]
+    plans = ClearPlans(GripperArm.of(HOAP3, "right"), planner(), checker())
+    lifted = plans.fetch(at(place), np.empty((0, 2))).end
     motion = plans.hold(lifted, np.array(RelocatorOptions().hold), np.empty((0, 2)))
     pose = HOAP3.base_pose.copy()
     pose[JOINTS] = motion.angles[0]

@@ -32,7 +32,12 @@ def started(folder, *numbers, program=PROGRAM):
     return subprocess.Popen(
         [sys.executable, "-c", program, *numbers],
         cwd=folder,
-        env={"PATH": "/usr/bin:/bin", "HOME": str(folder), "XDG_CACHE_HOME": str(folder / "cache")},
+        env={
+            "PATH": "/usr/bin:/bin",
+            "HOME": str(folder),
+            "XDG_CACHE_HOME": str(folder / "cache"),
+            "PYTHONDONTWRITEBYTECODE": "1",  # Python takes a file of the same size and second for unchanged
+        },
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -13,6 +13,7 @@ from paramove.bus import topics
 from paramove.bus.subscriber import Received
 from paramove.bus.ticks import Tick
 from paramove.motion.clear_plans import ClearPlans
+from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.planned_motion import PlannedMotion
 from paramove.motion.synthesizer import Synthesizer
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
@@ -188,7 +189,7 @@ class Cell:
 
     def __init__(self, driver: FakeDriver | None = None) -> None:
         self.driver = driver or FakeDriver()
-        self.synthesizer = Synthesizer(RememberedPlans(planner(), checker()))
+        self.synthesizer = Synthesizer(RememberedPlans(GripperArm.of(HOAP3, "right"), planner(), checker()))
         self.statuses: list[RelocationStatus] = []
         self.events: list[Received | Tick] = []
         self.now_ns = 0
@@ -196,7 +197,7 @@ class Cell:
 
     def restart(self) -> None:
         """The synthesizer's process is a new one."""
-        self.synthesizer = Synthesizer(RememberedPlans(planner(), checker()))
+        self.synthesizer = Synthesizer(RememberedPlans(GripperArm.of(HOAP3, "right"), planner(), checker()))
 
     def feel(self) -> None:
         """The joints are heard."""

@@ -5,7 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from paramove.motion.joint_path import joined
+from paramove.motion.planned_motion import PlannedMotion
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.robots.description import RobotDescription
 from tests.motion.reaching import reaching_model
@@ -18,6 +21,12 @@ GRASP_Z = 0.016
 @cache
 def reaching(name: str) -> ServoArmReaching:
     return ServoArmReaching(description(name), reaching_model())
+
+
+def pick_and_place(name: str, source: ArrayLike, place: ArrayLike) -> PlannedMotion:
+    """Both motions of a relocation."""
+    fetch = reaching(name).fetch(source)
+    return joined(fetch, reaching(name).deliver(fetch.end, place))
 
 
 def description(name: str) -> RobotDescription:

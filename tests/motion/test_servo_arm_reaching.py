@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from paramove.motion.planned_motion import PlannedMotion
+from paramove.motion.clearance import UprightCylinder
+from paramove.motion.planned_motion import PlannedMotion, RestPose
+from paramove.motion.plans import NoPlanError
 from paramove.motion.servo_arm_reaching import ServoArmReaching
+from paramove.motion.table_clearance import MAX_STANDING, TableClearance
 from paramove.robots.description import DescriptionError
 from paramove.robots.out_of_reach import OutOfReachError
 from paramove.safety.trajectory_check import check_trajectory
 from tests.motion.reaching import HOAP3, reaching_model
-from tests.motion.servo_reaching import GRASP_Z, description, places, reaching
+from tests.motion.servo_reaching import GRASP_Z, description, pick_and_place, places, reaching
 from tests.robots.servo_arms import ARMS, ArmModel
 
 NAMES = [robot.name for robot in ARMS]
@@ -59,7 +62,7 @@ def assert_playable(name: str, motion: PlannedMotion, start: np.ndarray | None =
     plan, robot = reaching(name), description(name)
     commanded = Oracle(name).whole(plan.base_angles if start is None else start)
     limits = robot.motion_limits
-    checked = check_trajectory(plan.joints, motion.times, motion.angles, commanded, limits, np.deg2rad(0.01))
+    checked = check_trajectory(plan.arm.joints, motion.times, motion.angles, commanded, limits, np.deg2rad(0.01))
     np.testing.assert_allclose(checked.duration_s, motion.times[-1], rtol=0, atol=0.011)
     jerk = np.abs(np.diff(motion.angles, 3, axis=0)).max(axis=0) / 0.01**3
     assert (jerk <= robot.jerk).all()
@@ -83,7 +86,7 @@ def test_picks_and_places_within_limits_and_clear_of_the_table(name: str) -> Non
     plan, oracle = reaching(name), Oracle(name)
     ends = places(name, 8, (GRASP_Z, GRASP_Z), seed=2, farthest=0.75)
     for source, place in zip(ends[::2], ends[1::2], strict=True):
-        motion = plan.pick_and_place(source, place)
+        motion = pick_and_place(name, source, place)
         assert_playable(name, motion)
         assert not any(oracle.touches_table(row) for row in motion.angles[::4])
         at = {phase: motion.angles[round(start / 0.01)] for phase, start in motion.phases}
@@ -97,9 +100,9 @@ def test_picks_and_places_within_limits_and_clear_of_the_table(name: str) -> Non
 
 @each_arm
 def test_the_gripper_is_open_over_the_object_and_closed_while_it_holds_it(name: str) -> None:
-    chain, plan = description(name).chain, reaching(name)
+    chain = description(name).chain
     assert chain is not None
-    motion = plan.pick_and_place((0.15, -0.05, GRASP_Z), (0.14, 0.08, GRASP_Z))
+    motion = pick_and_place(name, (0.15, -0.05, GRASP_Z), (0.14, 0.08, GRASP_Z))
     opening = (motion.angles[:, -1] - chain.gripper_closed) / (chain.gripper_open - chain.gripper_closed)
     starts = {phase: round(start / 0.01) for phase, start in motion.phases}
     np.testing.assert_allclose(opening[starts["lower"] : starts["grasp"]], 0.6, rtol=0, atol=1e-9)
@@ -112,8 +115,7 @@ def test_the_gripper_is_open_over_the_object_and_closed_while_it_holds_it(name: 
 
 @each_arm
 def test_the_hand_points_down_where_it_grasps_if_it_can(name: str) -> None:
-    plan = reaching(name)
-    motion = plan.pick_and_place((0.15, 0.0, GRASP_Z), (0.12, 0.10, GRASP_Z))
+    motion = pick_and_place(name, (0.15, 0.0, GRASP_Z), (0.12, 0.10, GRASP_Z))
     pitch = np.rad2deg(description(name).chain.kinematics.forward(motion.angles[:, :-1]).pitch)
     starts = {phase: round(start / 0.01) for phase, start in motion.phases}
     np.testing.assert_allclose(pitch[[starts["grasp"], starts["release"]]], 90.0, rtol=0, atol=1e-6)
@@ -124,13 +126,70 @@ def test_begins_wherever_the_arm_is(name: str) -> None:
     plan, oracle = reaching(name), Oracle(name)
     start = plan.reach((0.10, -0.14, 0.05)).angles[-1]
     start[-2] += 0.3 if name == "koch_v1_1" else 0.0  # the roll, which the planned paths leave at 0
-    motion = plan.reach((0.14, 0.10, 0.08), start)
+    motion = plan.reach((0.14, 0.10, 0.08), start=RestPose(start, plan.arm.position(start)))
     np.testing.assert_allclose(motion.angles[0], start, rtol=0, atol=1e-12)
     assert np.linalg.norm(oracle.hand(motion.angles[-1]) - (0.14, 0.10, 0.08)) < 1e-6
     assert_playable(name, motion, start)
-    home = plan.home(motion.angles[-1])
+    home = plan.home(motion.end)
     np.testing.assert_allclose(home.angles[-1], plan.base_angles, rtol=0, atol=1e-12)
     assert_playable(name, home, motion.angles[-1])
+
+
+@each_arm
+def test_a_standing_object_in_the_way_is_kept_clear_of(name: str) -> None:
+    robot, tall = description(name), UprightCylinder(0.01, 0.08)
+    plan, clearance = (
+        ServoArmReaching(robot, reaching_model(), cylinder=tall),
+        TableClearance(robot, robot.chain, 0.0, tall),
+    )
+    source, target = (0.15, -0.08, GRASP_Z), (0.15, 0.08, GRASP_Z)
+    fetch = plan.fetch(source)
+    free = plan.deliver(fetch.end, target)
+    carried = free.gripper[free.holding]
+    standing = carried[np.abs(carried[:, 1]).argmin()][None, :2]
+    allowed = plan.options.clearance
+    assert clearance.to_standing(free.angles[free.holding][::3], standing, True)[0] < allowed
+    around = plan.deliver(fetch.end, target, standing)
+    assert clearance.to_standing(around.angles[around.holding][::3], standing, True)[0] > 0.9 * allowed
+    assert clearance.to_standing(around.angles[~around.holding][::3], standing, False)[0] > 0.9 * allowed
+    assert_playable(name, around, fetch.angles[-1])
+
+
+@each_arm
+def test_what_no_path_keeps_clear_of_is_named(name: str) -> None:
+    with pytest.raises(NoPlanError, match="standing object") as rejection:
+        reaching(name).fetch((0.15, 0.0, GRASP_Z), np.array([[0.05, 0.2], [0.157, 0.0]]))
+    assert rejection.value.in_the_way == {1}
+    with pytest.raises(NoPlanError, match="at most"):
+        reaching(name).fetch((0.15, 0.0, GRASP_Z), np.full((MAX_STANDING + 1, 2), 1.0))
+
+
+@each_arm
+def test_what_it_holds_is_put_down_before_it_goes_home(name: str) -> None:
+    plan = reaching(name)
+    lifted = plan.fetch((0.15, 0.05, GRASP_Z)).end
+    motion = plan.home(lifted, holding=True)
+    assert [phase for phase, _ in motion.phases] == ["place", "release", "withdraw", "retreat"]
+    released = motion.gripper[motion.holding][-1]
+    np.testing.assert_allclose(released, (0.15, 0.05, GRASP_Z), rtol=0, atol=1e-4)
+    np.testing.assert_allclose(motion.angles[-1], plan.base_angles, rtol=0, atol=1e-12)
+    assert_playable(name, motion, lifted.angles)
+
+
+@each_arm
+def test_opens_and_closes_the_gripper_and_leaves(name: str) -> None:
+    plan = reaching(name)
+    here = plan.reach((0.15, 0.05, 0.08)).end
+    closing = plan.fingers(here, plan.offer_opening, plan.closed_opening)
+    assert plan.arm.opening_of(closing.angles[-1, -1]) == pytest.approx(plan.closed_opening, abs=1e-9)
+    np.testing.assert_allclose(closing.gripper, np.repeat(here.gripper[None], len(closing.times), axis=0), atol=1e-9)
+    assert closing.holding[-1]
+    leaving = plan.leave(closing.end, plan.closed_opening)
+    assert [phase for phase, _ in leaving.phases] == ["release", "retreat"]
+    np.testing.assert_allclose(leaving.angles[-1], plan.base_angles, rtol=0, atol=1e-12)
+    held = plan.hold(plan.fetch((0.15, -0.05, GRASP_Z)).end, (0.14, 0.06, 0.1))
+    np.testing.assert_allclose(held.gripper[-1], (0.14, 0.06, 0.1), rtol=0, atol=1e-6)
+    assert held.holding[1:].all()
 
 
 @each_arm
@@ -165,7 +224,7 @@ def test_a_target_out_of_reach_is_refused_with_a_place_that_can_be_reached(name:
 @each_arm
 def test_below_the_table_nothing_is_reached(name: str) -> None:
     with pytest.raises(OutOfReachError, match="the hand would touch the table or the arm itself") as rejection:
-        reaching(name).pick_and_place((0.15, 0.0, 0.002), (0.15, 0.05, GRASP_Z))
+        pick_and_place(name, (0.15, 0.0, 0.002), (0.15, 0.05, GRASP_Z))
     assert rejection.value.position is not None
     assert rejection.value.position[2] > 0.005
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from paramove.motion.planned_motion import PlannedMotion
-from tests.motion.servo_reaching import description, reaching
+from tests.motion.servo_reaching import description, pick_and_place, reaching
 from tests.robots.servo_arms import ARMS, ArmModel
 
 STIFFNESS, DAMPING = 30.0, 0.6
@@ -34,9 +34,9 @@ class PlayedArm:
         start = robot.base_pose.copy()
         start[[*robot.chain.indices, robot.chain.gripper_index]] = motion.angles[0]
         self.scene.place(start)
-        self._qpos = [model.joint(name).qposadr[0] for name in plan.joints]
-        self._dofs = [model.joint(name).dofadr[0] for name in plan.joints]
-        self._motors = [model.actuator(name).id for name in plan.joints]
+        self._qpos = [model.joint(name).qposadr[0] for name in plan.arm.joints]
+        self._dofs = [model.joint(name).dofadr[0] for name in plan.arm.joints]
+        self._motors = [model.actuator(name).id for name in plan.arm.joints]
         stall = model.actuator_ctrlrange[self._motors, 1]
         self._maximum = stall * [*np.ones(len(stall) - 1), GRIPPER_SHARE]
         self._stiffness, self._damping = STIFFNESS * stall, DAMPING * stall
@@ -62,7 +62,7 @@ class PlayedArm:
 @pytest.mark.parametrize("name", [robot.name for robot in ARMS])
 def test_friction_alone_carries_the_cube_to_its_place(name: str) -> None:
     cube, source, place = PLACES[name]
-    motion = reaching(name).pick_and_place(source, place)
+    motion = pick_and_place(name, source, place)
     arm = PlayedArm(name, motion)
     before = {body: arm.place_of(body) for body in ("red_cube", "green_cube", "blue_cylinder")}
     np.testing.assert_allclose(before[cube][:2], source[:2], rtol=0, atol=1e-9)
@@ -78,7 +78,7 @@ def test_friction_alone_carries_the_cube_to_its_place(name: str) -> None:
 def test_above_the_cube_nothing_is_carried(name: str) -> None:
     """So that the test above cannot pass by a body that sticks to the hand."""
     cube, source, place = PLACES[name]
-    motion = reaching(name).pick_and_place(np.add(source, (0.0, 0.0, 0.03)), place)
+    motion = pick_and_place(name, np.add(source, (0.0, 0.0, 0.03)), place)
     arm = PlayedArm(name, motion)
     before = arm.place_of(cube)
     arm.play(motion)

@@ -10,8 +10,10 @@ import sys
 import numpy as np
 import pytest
 
-from paramove.motion.clear_plans import ClearPlans, NoClearPlanError
+from paramove.motion.clear_plans import ClearPlans
+from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.planned_motion import PlannedMotion
+from paramove.motion.plans import NoPlanError
 from sim.places import STRIP_X, STRIP_Y
 from tests.motion.reaching import CORNERS, GRASP_Z, HOAP3, JOINTS, OPENINGS, at, checker, planner
 
@@ -23,13 +25,13 @@ STRIP = [(x, y) for x in STRIP_X for y in (STRIP_Y[0], -0.045, 0.01, STRIP_Y[1])
 
 
 def plans() -> ClearPlans:
-    return ClearPlans(planner(), checker())
+    return ClearPlans(GripperArm.of(HOAP3, "right"), planner(), checker())
 
 
 def fetched(place: tuple[float, float]) -> PlannedMotion | None:
     try:
         return plans().fetch(at(place), NOTHING)
-    except NoClearPlanError:
+    except NoPlanError:
         return None
 
 
@@ -39,8 +41,8 @@ def can_be_fetched_and_put(place: tuple[float, float]) -> bool:
     if motion is None:
         return False
     try:
-        plans().deliver(motion.gripper[-1], at(place), NOTHING)
-    except NoClearPlanError:
+        plans().deliver(motion.end, at(place), NOTHING)
+    except NoPlanError:
         return False
     return True
 
@@ -73,7 +75,7 @@ def test_openings_lie_inside(opening: tuple[float, float]) -> None:
     for place in (STRIP[0], STRIP[-1]):
         motion = fetched(place)
         assert motion is not None
-        plans().deliver(motion.gripper[-1], at(opening), NOTHING)
+        plans().deliver(motion.end, at(opening), NOTHING)
 
 
 def test_planned_angles_keep_a_degree_from_the_limits() -> None:

@@ -47,7 +47,7 @@ from tests.applications.story import Story
 from tests.motion.fake_driver import Cell, goal
 from tests.motion.reaching import OPENINGS, ROBOT_FOLDER, reaching_model
 from tests.nodes.bad_messages import first_not_finite, variants
-from tests.nodes.test_reacher import ARM_FOLDER, TASKS
+from tests.nodes.test_reacher import TASKS
 from tests.objects.tracks import hand_with_tip, image_of, standing
 from tests.observation.test_markers import EYES, with_markers
 from tests.pointing.persons import performed, poses
@@ -243,7 +243,7 @@ NODES: dict[str, tuple[Any, Callable[[], list[Event]], dict[str, Any]]] = {
     "rule_learner": (rule_learner, of_rule_learner, {}),
     "relocator": (relocator, of_relocator, {}),
     "synthesizer": (synthesizer, of_synthesizer, {"robot": ROBOT_FOLDER}),
-    "reacher": (reacher, of_reacher, {"robot": ARM_FOLDER, "tasks": TASKS}),
+    "reacher": (reacher, of_reacher, {"tasks": TASKS}),
     "arm_driver": (arm_driver, of_arm_driver, {"robot": ROBOT_FOLDER}),
     "operator": (operator, of_operator, {"arms_at_start": True}),
     "recorder": (recorder, of_recorder, {}),
@@ -252,7 +252,7 @@ NODES: dict[str, tuple[Any, Callable[[], list[Event]], dict[str, Any]]] = {
 
 def _config(node: str, folder: Path) -> Any:
     module, _, parameters = NODES[node]
-    if node in ("synthesizer", "reacher"):
+    if node == "synthesizer":
         reaching_model().save(folder / "reaching.npz")
         parameters = {**parameters, "movement": {"file": folder / "reaching.npz"}}
     if node == "body_tracker":

@@ -69,12 +69,14 @@ class GoalClient:
         target: Position | None = None,
         avoid: Iterable[tuple[float, float]] = (),
         attempt: int = 1,
+        plan_only: bool = False,
     ) -> None:
         """Set a goal; it is sent with the next `step`."""
         self._count += 1
         goal = RelocationGoal(
             id=f"{self._run_name}-{self._count}", kind=kind, object=name, frame=self._goals.frame, attempt=attempt
         )
+        goal.plan_only = plan_only
         if source is not None:
             getattr(goal, "from").CopyFrom(source)
         if target is not None:
@@ -82,7 +84,7 @@ class GoalClient:
         goal.avoid.extend(self._goals.position(place) for place in avoid)
         self._goal, self._status, self._sent_s, self.started_s = goal, None, float("-inf"), now_s
         self._received_s = now_s
-        if kind in (RelocationGoal.KIND_RELOCATE, RelocationGoal.KIND_FETCH):
+        if kind in (RelocationGoal.KIND_RELOCATE, RelocationGoal.KIND_FETCH) and not plan_only:
             self.grasps += 1
             self.retries += attempt > 1
 
@@ -106,6 +108,11 @@ class GoalClient:
             sent.CopyFrom(self._goal)
             outgoing.goals.append(sent)
             self._sent_s = now_s
+
+    @property
+    def running(self) -> bool:
+        """Whether a goal was set that has no final status yet."""
+        return self._goal is not None and self.outcome is None
 
     @property
     def outcome(self) -> RelocationStatus | None:

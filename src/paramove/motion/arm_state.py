@@ -6,63 +6,65 @@ from collections import deque
 
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
-from paramove.motion.planned_motion import PlannedMotion
-from paramove.robots import Arm
+from paramove.motion.gripper_arm import GripperArm
+from paramove.motion.planned_motion import PlannedMotion, RestPose
 
-FELT_OPENING = 0.12  # a closed hand whose fingers stop at a wider opening than this holds something
+FELT_OPENING = 0.12  # a closed gripper that stops at a wider opening than this holds something
 GRIPPING_OPENINGS = (0.36, 0.5)  # where fingers rest on an object; at the base pose they are at 0.3, open hands wider
 REST_NS = 1_000_000_000  # a grasp pauses the arm for up to 0.8 s
 STALE_NS = 500_000_000
-BASE_TOLERANCE = np.deg2rad([1.0, 1.0, 1.0, 1.0, 3.0, 3.0])  # the wrist's and the fingers' units are 1 to 1.5 deg
-REST_TOLERANCE = np.deg2rad([0.3, 0.3, 0.3, 0.3, 1.6, 1.1])
+MAX_ANGLE = 2.0 * np.pi
+BASE_TOLERANCE, COARSE_TOLERANCE = np.deg2rad([1.0, 3.0])
+COARSE = np.deg2rad(0.9)  # a joint with larger units, as HOAP-3's wrist and fingers have
+REST_TOLERANCE, REST_TOLERANCE_BEYOND_UNIT = np.deg2rad([0.3, 0.1])
 
 
 class ArmState:
-    """Pose and hand of the arm between motions.
+    """Pose and gripper of the arm between motions.
 
     After a start, or after a motion was stopped, the pose is unknown; it is estimated from the measured joints as soon
     as they rest.
 
     Args:
-        arm: Its joints and fingers.
-        base_angles: Of the base pose, [6], rad: five joints and the fingers.
+        arm: Its joints and gripper.
 
     Attributes:
         known: Whether the other attributes are valid.
-        at_base: Whether the arm is at its base pose.
-        gripper: Its position elsewhere, [3], m, shoulder frame.
-        measured_angles: The angles [6] that this was estimated from; None after a motion of this process.
-        opening: ξ that the hand is commanded to have.
-        measured: ξ of the measured fingers.
-        lost: Whether an object has slipped out of the hand.
+        pose: Where the arm rests; None at its base pose.
+        opening: ξ that the gripper is commanded to have.
+        measured: ξ of the measured gripper.
+        lost: Whether an object has slipped out of the gripper.
+        missing: Names of the arm's joints that the latest message, which had others, did not have.
     """
 
-    def __init__(self, arm: Arm, base_angles: ArrayLike) -> None:
+    def __init__(self, arm: GripperArm) -> None:
         self._arm = arm
-        self._base = np.asarray(base_angles, dtype=np.float64)
+        self._base_tolerance = np.where(arm.resolution > COARSE, COARSE_TOLERANCE, BASE_TOLERANCE)
+        self._rest_tolerance = np.maximum(REST_TOLERANCE, arm.resolution + REST_TOLERANCE_BEYOND_UNIT)
         self._measurements: deque[tuple[int, Floats]] = deque()
         self._busy_until_ns = 0
         self.known = False
-        self.at_base = False
-        self.gripper: Floats | None = None
-        self.measured_angles: Floats | None = None
+        self.pose: RestPose | None = None
         self.opening = 1.0
         self.measured = 1.0
         self.lost = False
+        self.missing: tuple[str, ...] = ()
+
+    @property
+    def at_base(self) -> bool:
+        """Whether the arm is known to be at its base pose."""
+        return self.known and self.pose is None
 
     def handle(self, message: JointStates, now_ns: int) -> bool:
         """Updates with the measured joints; returns False, without a change, if one is missing or not finite."""
         measured = {joint.name: joint.position for joint in message.joints}
-        try:
-            angles = np.array([measured[name] for name in (*self._arm.joints, self._arm.fingers)])
-        except KeyError:
+        self.missing = tuple(name for name in self._arm.joints if measured and name not in measured)
+        angles = np.array([measured.get(name, np.nan) for name in self._arm.joints])
+        if not (np.abs(angles) <= MAX_ANGLE).all():  # NaN is not below either
             return False
-        if not np.isfinite(angles).all():
-            return False
-        self.measured = self.opening_of(float(angles[5]))
+        self.measured = self._arm.opening_of(float(angles[-1]))
         self._measurements.append((now_ns, angles))
         while len(self._measurements) > 2 and now_ns - self._measurements[1][0] >= REST_NS:
             self._measurements.popleft()
@@ -79,10 +81,8 @@ class ArmState:
 
     def ended(self, motion: PlannedMotion) -> None:
         """A motion has been executed: the arm is where it ends."""
-        base = motion.phases[-1][0] == "retreat"
-        self.known, self.at_base, self.measured_angles = True, base, None
-        self.gripper = None if base else motion.gripper[-1]
-        self.opening = self.opening_of(float(motion.angles[-1, 5]))
+        self.known, self.pose = True, None if motion.phases[-1][0] == "retreat" else motion.end
+        self.opening = self._arm.opening_of(float(motion.angles[-1, -1]))
 
     def estimate_pose(self, now_ns: int) -> bool:
         """Estimates the pose from the measured joints if they are at the base pose or rest; whether it is known."""
@@ -91,23 +91,18 @@ class ArmState:
         latest_ns, angles = self._measurements[-1]
         if now_ns - latest_ns > STALE_NS:
             return False
-        self.at_base = bool((np.abs(angles - self._base) <= BASE_TOLERANCE).all())
-        if not self.at_base and not self._rests():
+        at_base = bool((np.abs(angles - self._arm.base_angles) <= self._base_tolerance).all())
+        if not at_base and not self._rests():
             return False
-        self.known, self.measured_angles = True, None if self.at_base else angles
-        self.gripper = None if self.at_base else self._arm.kinematics.forward(angles[:5]).gripper
-        self.opening = self.opening_of(float(self._base[5] if self.at_base else angles[5]))
-        if not self.at_base and GRIPPING_OPENINGS[0] < self.opening < GRIPPING_OPENINGS[1]:
+        self.known = True
+        self.pose = None if at_base else RestPose(angles, self._arm.position(angles), measured=True)
+        self.opening = self._arm.opening_of(float(self._arm.base_angles[-1] if at_base else angles[-1]))
+        if not at_base and GRIPPING_OPENINGS[0] < self.opening < GRIPPING_OPENINGS[1]:
             self.opening = 0.0  # an object holds the fingers open there
         return True
-
-    def opening_of(self, fingers: float) -> float:
-        """ξ of an angle of the fingers."""
-        span = self._arm.fingers_open - self._arm.fingers_closed
-        return float(np.clip((fingers - self._arm.fingers_closed) / span, 0.0, 1.0))
 
     def _rests(self) -> bool:
         if self._measurements[-1][0] - self._measurements[0][0] < REST_NS:
             return False
         angles = np.array([angles for _, angles in self._measurements])
-        return bool((np.ptp(angles, axis=0) <= REST_TOLERANCE).all())
+        return bool((np.ptp(angles, axis=0) <= self._rest_tolerance).all())

@@ -11,8 +11,10 @@ import numpy as np
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.clearance import ClearanceChecker
+from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.joint_path import joined, joint_motion
-from paramove.motion.planned_motion import PlannedMotion
+from paramove.motion.planned_motion import PlannedMotion, RestPose
+from paramove.motion.plans import NoPlanError
 from paramove.motion.relocation import RelocationPlanner
 
 MIN_CLEARANCE = 0.005  # m, of planned paths from table, body and standing objects
@@ -21,19 +23,8 @@ _HIGHER_CARRY = np.array([0.0, 0.0, 0.012])
 _BEHIND_ROW = 0.004
 _MIN_TO_STANDING = 0.003  # m, where no alternative keeps more: positions of standing objects are known to about 2 mm
 _HALF_OPEN = 0.45  # ξ; an object of 20 mm is released at less than half of it
+NOT_AT_BASE = "the arm is not at its base pose; send a goal of kind REST first"
 _HIGH = 0.055  # m above the working plane's grasp height: an empty hand there has left the objects below it
-
-
-class NoClearPlanError(ValueError):
-    """No alternative of the motion is both reachable and clear; the message gives the reason for each.
-
-    Attributes:
-        in_the_way: Numbers of the standing objects that alternatives would come too close to.
-    """
-
-    def __init__(self, message: str, in_the_way: frozenset[int] = frozenset()) -> None:
-        super().__init__(message)
-        self.in_the_way = in_the_way
 
 
 class _Alternative(Protocol):
@@ -45,42 +36,43 @@ _Choices = Mapping[str, object]
 
 
 class ClearPlans:
-    """Tries the alternatives of a motion in order of preference.
+    """`MotionPlans` of a humanoid's arm: tries the alternatives of a motion in order of preference.
 
     Args:
+        arm: Its joints and fingers.
         planner: Builds motions from the converted movement.
         checker: Measures their distance from table, body and standing objects.
     """
 
-    def __init__(self, planner: RelocationPlanner, checker: ClearanceChecker) -> None:
-        self.planner, self._checker = planner, checker
+    def __init__(self, arm: GripperArm, planner: RelocationPlanner, checker: ClearanceChecker) -> None:
+        self.arm, self.planner, self._checker = arm, planner, checker
+        self.offer_opening, self.closed_opening = planner.options.offer_opening, planner.options.closed_opening
 
-    def fetch(self, source: Floats, standing: Floats) -> PlannedMotion:
-        """Reach from before the object as in 5.2.5; if that is not clear, lower the open hand over it.
+    def within_training(self, position: Floats) -> bool | None:
+        """Whether the movement was trained around this position."""
+        return self.planner.movement.within_training(position)
 
-        Args:
-            source: Where the object is grasped, [3], m, shoulder frame.
-            standing: Other objects, [M, 2].
-        """
+    def fetch(self, source: Floats, standing: Floats, start: RestPose | None = None) -> PlannedMotion:
+        """Reach from before the object as in 5.2.5; if that is not clear, lower the open hand over it."""
+        _check_at_base(start)
         heights = (self.planner.options.entry_height, _HIGHER_ENTRY)
         kinds = [(height, above) for above in (False, True) for height in heights]
         alternatives = [partial(self.planner.fetch, source, height, above) for height, above in kinds]
         choices = [{"approach": kind, "lower": kind, "reach": kind[1]} for kind in kinds]
         return self._first(alternatives, standing, choices)
 
-    def deliver(self, start: Floats, target: Floats, standing: Floats) -> PlannedMotion:
+    def deliver(self, start: RestPose, target: Floats, standing: Floats) -> PlannedMotion:
         """Carry straight; if that is not clear, first back to the target's row, or higher. Withdraw back, else up.
 
         Where the open fingers would touch a neighbour, the hand is opened less.
         """
-        back = np.array([target[0] + _BEHIND_ROW, start[1], start[2]])
+        here = start.gripper
+        back = np.array([target[0] + _BEHIND_ROW, here[1], here[2]])
         detours: list[list[Floats]] = [[], [back], [back + _HIGHER_CARRY]]
         leavings = [(upward, opened) for opened in (None, _HALF_OPEN) for upward in (False, True)]
         kinds = [(number, leaving) for leaving in leavings for number in range(len(detours))]
         alternatives = [
-            partial(
-                self.planner.deliver, start, target, [self.planner.far_enough(p) for p in detours[number]], *leaving
-            )
+            partial(self.planner.deliver, here, target, [self.planner.far_enough(p) for p in detours[number]], *leaving)
             for number, leaving in kinds
         ]
         choices = [
@@ -89,24 +81,31 @@ class ClearPlans:
         ]
         return self._first(alternatives, standing, choices)
 
-    def hold(self, start: Floats, position: Floats, standing: Floats) -> PlannedMotion:
+    def hold(self, start: RestPose, position: Floats, standing: Floats) -> PlannedMotion:
         """Carry a held object to `position` and stay there: straight, else over the start or over the position."""
-        corners = [np.array([*side[:2], max(start[2], position[2])]) for side in (start, position)]
+        here = start.gripper
+        corners = [np.array([*side[:2], max(here[2], position[2])]) for side in (here, position)]
         alternatives = [[], *([self.planner.far_enough(corner)] for corner in corners)]
-        return self._first([partial(self.planner.hold, start, position, via) for via in alternatives], standing)
+        return self._first([partial(self.planner.hold, here, position, via) for via in alternatives], standing)
 
-    def leave(self, here: Floats, opening: float, standing: Floats) -> PlannedMotion:
+    def leave(self, here: RestPose, opening: float, standing: Floats) -> PlannedMotion:
         """Open the hand and go back to the base pose, withdrawing back, else up."""
-        return self._first([partial(self.planner.leave, here, opening, upward) for upward in (False, True)], standing)
+        alternatives = [partial(self.planner.leave, here.gripper, opening, upward) for upward in (False, True)]
+        return self._first(alternatives, standing)
 
-    def home(self, angles: Floats, holding: bool, standing: Floats) -> PlannedMotion:
-        """From measured `angles` [6], rad, wherever they are, to the base pose.
+    def home(self, here: RestPose, opening: float, holding: bool, standing: Floats) -> PlannedMotion:
+        """From wherever the arm rests to the base pose; after a planned motion as `leave`.
 
-        A held object is put down where it is. An empty hand is opened and withdrawn as after a placing; where it is
-        already above all objects, or where that is not possible, the arm goes straight in joint angles.
+        From measured angles, a held object is put down where it is. An empty hand is opened and withdrawn as after a
+        placing; where it is already above all objects, or where that is not possible, the arm goes straight in joint
+        angles.
         """
+        if not here.measured:
+            return self.leave(here, opening, standing)
+        return self._home_from_measured(here.angles, here.gripper, holding, standing)
+
+    def _home_from_measured(self, angles: Floats, here: Floats, holding: bool, standing: Floats) -> PlannedMotion:
         planner = self.planner
-        here = planner.arm.kinematics.forward(angles[:5]).gripper
         span = planner.arm.fingers_open - planner.arm.fingers_closed
         opening = 0.0 if holding else float(np.clip((angles[5] - planner.arm.fingers_closed) / span, 0.0, 1.0))
         start = np.array([*angles[:5], planner.arm.fingers_angle(opening)])
@@ -141,20 +140,21 @@ class ClearPlans:
             holding,
         )
 
-    def offer(self, position: Floats, standing: Floats) -> PlannedMotion:
+    def reach(self, position: Floats, standing: Floats, start: RestPose | None = None) -> PlannedMotion:
         """Go to `position` with an open hand."""
+        _check_at_base(start)
         return self._first([partial(self.planner.offer, position)], standing)
 
-    def fingers(self, here: Floats, start: float, end: float, standing: Floats) -> PlannedMotion:
+    def fingers(self, here: RestPose, opening: float, end: float, standing: Floats) -> PlannedMotion:
         """Open or close the hand where it is."""
-        return self._first([partial(self.planner.fingers, here, start, end)], standing)
+        return self._first([partial(self.planner.fingers, here.gripper, opening, end)], standing)
 
     def _first(
         self, alternatives: Sequence[_Alternative], standing: Floats, choices: Sequence[_Choices] | None = None
     ) -> PlannedMotion:
         """The first reachable and clear alternative; `choices` skips those that would fail like a previous one."""
         if len(standing) > self._checker.n_standing:
-            raise NoClearPlanError(
+            raise NoPlanError(
                 f"{len(standing)} objects to keep clear of; at most {self._checker.n_standing} at once are possible"
             )
         middle = self._checker.surface_z + self._checker.cylinder.height / 2
@@ -187,4 +187,9 @@ class ClearPlans:
             )
         if next_best[1] is not None:
             return next_best[1]
-        raise NoClearPlanError("; ".join(dict.fromkeys(reasons)), frozenset(in_the_way))
+        raise NoPlanError("; ".join(dict.fromkeys(reasons)), frozenset(in_the_way))
+
+
+def _check_at_base(start: RestPose | None) -> None:
+    if start is not None:
+        raise NoPlanError(NOT_AT_BASE)

@@ -15,7 +15,7 @@ from paramove.robots import RobotDescription
 
 _FAR = 0.05  # larger distances are not distinguished, m
 _HIDDEN = 10.0
-_GRASPED_ABOVE_MIDDLE = 0.011
+GRASPED_ABOVE_MIDDLE = 0.011
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class ClearanceChecker:
             body.add_geom(name=f"standing_{k}", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size)
         gripper = _site(spec, self._arm.sites.gripper)
         held = gripper.parent.add_geom(name="held", type=mujoco.mjtGeom.mjGEOM_CYLINDER, pos=gripper.pos, size=size)
-        held.pos = np.array(gripper.pos) + np.array([0.0, 0.0, -_GRASPED_ABOVE_MIDDLE])  # grasped above the middle
+        held.pos = np.array(gripper.pos) + np.array([0.0, 0.0, -GRASPED_ABOVE_MIDDLE])  # grasped above the middle
         self._shoulder = shoulder
         return spec.compile()
 
@@ -120,7 +120,7 @@ class ClearanceChecker:
     @property
     def grasp_height(self) -> float:
         """Height at which a standing object is grasped, m, shoulder frame."""
-        return self._surface.z + self._cylinder.height / 2 + _GRASPED_ABOVE_MIDDLE
+        return self._surface.z + self._cylinder.height / 2 + GRASPED_ABOVE_MIDDLE
 
     @property
     def n_standing(self) -> int:

@@ -81,13 +81,28 @@ class Path:
 
 
 @dataclass(frozen=True)
+class RestPose:
+    """Where an arm rests between motions.
+
+    Attributes:
+        angles: Arm joints and gripper, [J + 1], rad.
+        gripper: Position of the end effector, [3], m, frame of the arm's base.
+        measured: Whether the angles were measured; otherwise they are the end of a planned motion.
+    """
+
+    angles: Floats
+    gripper: Floats
+    measured: bool = False
+
+
+@dataclass(frozen=True)
 class PlannedMotion:
     """A motion from rest to rest, ready for the driver.
 
     Attributes:
         times: [K], s, from 0.
-        angles: Arm joints and fingers, [K, 6], rad.
-        gripper: Where the gripper site shall be, [K, 3], m, shoulder frame.
+        angles: Arm joints and gripper, [K, J + 1], rad.
+        gripper: Where the end effector shall be, [K, 3], m, frame of the arm's base.
         holding: Whether an object is held, [K].
         phases: Name and start of each phase.
         elbow_turn: Largest turn of the elbow for a joint limit, rad.
@@ -99,6 +114,11 @@ class PlannedMotion:
     holding: NDArray[np.bool_]
     phases: tuple[tuple[str, float], ...]
     elbow_turn: float
+
+    @property
+    def end(self) -> RestPose:
+        """Where it ends."""
+        return RestPose(self.angles[-1], self.gripper[-1])
 
 
 def motion_message(name: str, joints: Sequence[str], motion: PlannedMotion, now_ns: int) -> JointTrajectory:

@@ -15,12 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
+from paramove.motion.clearance import UprightCylinder
+from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.hand_poses import HandPoses, metres
 from paramove.motion.learned_path import SMOOTHING, LearnedPath, PlacedPerson
 from paramove.motion.modelled_movement import robot_movement
 from paramove.motion.planar_path import NoJointPathError, planar_path
-from paramove.motion.planned_motion import PlannedMotion
-from paramove.motion.table_clearance import TableClearance
+from paramove.motion.planned_motion import PlannedMotion, RestPose
+from paramove.motion.plans import NoPlanError
+from paramove.motion.table_clearance import MAX_STANDING, TableClearance
 from paramove.motion.timing import minimum_jerk, ramped, rest_to_rest, smoothed
 from paramove.phmm import ParametricHMM
 from paramove.robots import DescriptionError, OutOfReachError, RobotDescription
@@ -34,98 +37,129 @@ _GAP_TO_ENDS_M = 0.0005
 _UP = np.array([0.0, 0.0, 1.0])
 
 
+NOTHING = np.empty((0, 2))
+"""No standing objects."""
+
+
 class ServoArmReaching:
-    """Plans motions of one arm. Angles are [J + 1], rad: the arm's joints and the gripper.
+    """`MotionPlans` of one arm. Angles are [J + 1], rad: the arm's joints and the gripper.
 
     Args:
         description: Of a robot with a chain.
         model: Of a person's reaching, its parameter the position that is reached; scaled to the size of the arm.
         options: Sizes.
+        cylinder: Shape of the objects that stand on the table.
 
     Raises:
         DescriptionError: The robot has no such arm.
         ValueError: The model is not one of reaching.
 
     Attributes:
-        joints: Names, the gripper last.
-        base_angles: The end of motions that go home.
+        arm: Joints, the gripper last; its base pose is the end of motions that go home.
         lower, upper: Limits of the angles.
-        start_tolerance: Maximum distance of a motion's start from the commanded angles, rad.
+        start_tolerance: Maximum distance of a motion's start from the limits, rad.
     """
 
     def __init__(
-        self, description: RobotDescription, model: ParametricHMM, options: ServoReachingOptions | None = None
+        self,
+        description: RobotDescription,
+        model: ParametricHMM,
+        options: ServoReachingOptions | None = None,
+        cylinder: UprightCylinder | None = None,
     ) -> None:
         chain = description.chain
         if chain is None:
             raise DescriptionError(f"{description.name} has no chain in its robot.yaml: it is not a servo arm")
         self._chain, self._arm = chain, chain.kinematics
+        self.arm = GripperArm.of(description, "")
         self.options = o = options or ServoReachingOptions()
-        self.joints = (*chain.joints, chain.gripper)
+        self.offer_opening, self.closed_opening = o.work_opening, o.closed_opening
         indices = [*chain.indices, chain.gripper_index]
-        self.base_angles = description.base_pose[indices]
+        self.base_angles = self.arm.base_angles
         self.lower, self.upper = description.soft_lower[indices], description.soft_upper[indices]
         rates = (description.operating_velocity, description.operating_acceleration, description.jerk)
         velocity, acceleration, jerk = (o.limit_fraction * limit[indices] for limit in rates)
         self._limits = (velocity, acceleration, jerk)
         self.start_tolerance = float(np.deg2rad(description.stream.start_tolerance_deg))
         self._period = description.stream.period_us * 1e-6
-        self._clearance = TableClearance(description, chain, o.table_z)
+        self._clearance = TableClearance(description, chain, o.table_z, cylinder)
         self._poses = HandPoses(chain, self._clearance, self._gripper(o.work_opening))
         length = float(np.hypot(*self._arm.upper_arm) + np.hypot(*self._arm.forearm) + self._arm.hand[0])
         middle = self._poses.middle(o.table_z, self._band(o.grasp_band_deg))
         self._person = PlacedPerson(robot_movement(model, length), middle, self._arm.yaw_axis, POINTS)
 
-    def reach(self, target: ArrayLike, start: ArrayLike | None = None) -> PlannedMotion:
-        """Bring the end effector to a position with an open hand, by the learned movement.
+    def reach(self, position: ArrayLike, standing: Floats = NOTHING, start: RestPose | None = None) -> PlannedMotion:
+        """Bring the end effector to a position with an open gripper, by the learned movement.
 
         Args:
-            target: Shape [3], frame of the base, m.
-            start: Angles from which the motion begins; None for the base pose.
+            position: Shape [3], frame of the base, m.
+            standing: Objects to keep clear of, [M, 2], m.
+            start: Where the motion begins; None for the base pose.
 
         Raises:
-            OutOfReachError: With the reason and the nearest reachable position, or that there is no path.
+            OutOfReachError: With the reason and the nearest reachable position.
+            NoPlanError: There is no clear path.
         """
-        goal = np.asarray(target, dtype=np.float64)
+        goal = np.asarray(position, dtype=np.float64)
         pitch = self._poses.pitch_at(goal, np.deg2rad(self.options.pitch_deg), self._band(self.options.reach_band_deg))
-        motion = self._begun(start)
+        motion = self._begun(start, standing)
         path = self._learned(self._person.approach, goal)
         self._go(motion, "reach", goal, pitch, path, self.options.work_opening, self.options.clearance)
         return self._finished(motion)
 
-    def pick_and_place(self, source: ArrayLike, place: ArrayLike, start: ArrayLike | None = None) -> PlannedMotion:
-        """Fetch the object at `source`, put it at `place` and go back to the base pose.
-
-        Args:
-            source, place: Of the end effector when it grasps and releases, [3], frame of the base, m.
-            start: As for `reach`.
-
-        Raises:
-            OutOfReachError: With the reason and the nearest reachable position, or that there is no path.
-        """
-        o = self.options
-        ends = [np.asarray(point, dtype=np.float64) for point in (source, place)]
-        pitches = [self._grasp_pitch(point) for point in ends]
-        motion = self._begun(start)
-        self._over(motion, "approach", ends[0], pitches[0], o.work_opening)
-        self._line(motion, "lower", ends[0], pitches[0])
-        self._fingers(motion, "grasp", o.closed_opening)
-        self._line(motion, "lift", *self._above(ends[0], pitches[0]), holding=True)
-        self._over(motion, "carry", ends[1], pitches[1], o.closed_opening, holding=True)
-        self._line(motion, "place", ends[1], pitches[1], holding=True)
-        self._fingers(motion, "release", o.work_opening)
-        self._line(motion, "withdraw", *self._above(ends[1], pitches[1]))
-        self._home(motion, "retreat", ends[1])
+    def fetch(self, source: ArrayLike, standing: Floats = NOTHING, start: RestPose | None = None) -> PlannedMotion:
+        """Grasp the object at `source` and lift it. Arguments and errors as for `reach`."""
+        point = np.asarray(source, dtype=np.float64)
+        pitch = self._grasp_pitch(point)
+        motion = self._begun(start, standing)
+        self._over(motion, "approach", point, pitch, self.options.work_opening)
+        self._line(motion, "lower", point, pitch)
+        self._fingers(motion, "grasp", self.options.closed_opening)
+        self._line(motion, "lift", *self._above(point, pitch), holding=True)
         return self._finished(motion)
 
-    def home(self, start: ArrayLike) -> PlannedMotion:
-        """Back to the base pose, by the learned retreat.
+    def deliver(self, start: RestPose, target: ArrayLike, standing: Floats = NOTHING) -> PlannedMotion:
+        """Carry the held object to `target`, release it, go back to the base pose. Errors as for `reach`."""
+        point = np.asarray(target, dtype=np.float64)
+        pitch = self._grasp_pitch(point)
+        motion = self._begun(start, standing)
+        self._over(motion, "carry", point, pitch, self.options.closed_opening, holding=True)
+        self._put(motion, point, pitch)
+        return self._finished(motion)
 
-        Raises:
-            OutOfReachError: There is no path.
-        """
-        motion = self._begun(start)
+    def hold(self, start: RestPose, position: ArrayLike, standing: Floats = NOTHING) -> PlannedMotion:
+        """Carry the held object to `position` and stay there. Errors as for `reach`."""
+        point, o = np.asarray(position, dtype=np.float64), self.options
+        pitch = self._poses.pitch_at(point, np.deg2rad(o.pitch_deg), self._band(o.reach_band_deg))
+        motion = self._begun(start, standing)
+        path = self._learned(self._person.approach, point)
+        self._go(motion, "carry", point, pitch, path, o.closed_opening, o.clearance, holding=True)
+        return self._finished(motion)
+
+    def fingers(self, here: RestPose, opening: float, end: float, standing: Floats = NOTHING) -> PlannedMotion:
+        """Open or close the gripper where it is."""
+        motion = self._begun(here, standing)
+        self._fingers(motion, "fingers", end)
+        return self._finished(motion)
+
+    def leave(self, here: RestPose, opening: float, standing: Floats = NOTHING) -> PlannedMotion:
+        """Open the gripper where it is, draw it up, go back to the base pose. Errors as for `reach`."""
+        motion = self._begun(here, standing)
+        self._fingers(motion, "release", self.options.work_opening)
         self._home(motion, "retreat", self._hand(motion.end))
+        return self._finished(motion)
+
+    def home(
+        self, here: RestPose, opening: float = 1.0, holding: bool = False, standing: Floats = NOTHING
+    ) -> PlannedMotion:
+        """Back to the base pose, by the learned retreat; a held object is put down first. Errors as for `reach`."""
+        motion = self._begun(here, standing)
+        hand = self._hand(motion.end)
+        if holding:
+            below = np.array([*hand[:2], min(hand[2], self.options.table_z + self.options.grasp_height)])
+            self._put(motion, below, self._grasp_pitch(below))
+        else:
+            self._home(motion, "retreat", hand)
         return self._finished(motion)
 
     def within_training(self, target: ArrayLike) -> bool | None:
@@ -133,6 +167,13 @@ class ServoArmReaching:
         return self._person.within_training(np.asarray(target, dtype=np.float64))
 
     # The parts of a motion
+
+    def _put(self, motion: MotionRows, point: Floats, pitch: float) -> None:
+        """Lower the held object, release it, go back to the base pose."""
+        self._line(motion, "place", point, pitch, holding=True)
+        self._fingers(motion, "release", self.options.work_opening)
+        self._line(motion, "withdraw", *self._above(point, pitch))
+        self._home(motion, "retreat", point)
 
     def _over(
         self, motion: MotionRows, name: str, point: Floats, pitch: float, opening: float, holding: bool = False
@@ -165,36 +206,35 @@ class ServoArmReaching:
         for fraction in _FRACTIONS:
             mild = path.milder(fraction)
             gripper = self._openings(motion.end, mild, opening)
-            rows, fault = self._clear(motion.end, mild, point, pitch, gripper, clearance)
+            rows, fault = self._clear(motion, mild, point, pitch, gripper, clearance, holding)
             reason = reason or fault
             if rows is not None and (best is None or len(rows) < len(best)):
                 best = rows
             if best is not None and self._period * len(best) <= self.options.longest_duration:
                 break
         if best is None:
-            raise OutOfReachError(
-                f"there is no path to {metres(point)} from {metres(self._hand(motion.end))}: {reason}"
-            )
+            raise motion.no_plan(f"there is no path to {metres(point)} from {metres(self._hand(motion.end))}: {reason}")
         motion.add(name, best, holding)
 
     def _clear(
         self,
-        start: Floats,
+        motion: MotionRows,
         path: LearnedPath,
         point: Floats,
         pitch: float,
         gripper: Floats,
         clearance: float,
+        holding: bool,
     ) -> tuple[Floats | None, str]:
         """Rows along a path with the smallest arch that is clear; if none is, None and the obstacle."""
         reason = ""
         for arch in _ARCHES_M:
             try:
-                rows = self._along(start, path.raised(arch), point, pitch, gripper)
+                rows = self._along(motion.end, path.raised(arch), point, pitch, gripper)
             except NoJointPathError as error:
                 reason = reason or str(error)
                 continue
-            fault = self._fault(rows, clearance)
+            fault = self._fault(motion, rows, clearance, holding)
             if not fault:
                 return rows, ""
             reason = reason or fault
@@ -209,13 +249,13 @@ class ServoArmReaching:
         try:
             arm = planar_path(self._arm, positions, np.full(n, pitch), motion.end[:-1])
         except NoJointPathError as error:
-            raise OutOfReachError(f"no straight line leads to {metres(point)}: {error}") from error
+            raise motion.no_plan(f"no straight line leads to {metres(point)}: {error}") from error
         knots = np.concatenate([arm, np.full((n, 1), motion.end[-1])], axis=1)
         duration = 1.875 * distance / self.options.speed  # the peak of the minimum-jerk profile
         rows = self._inside(rest_to_rest(knots, duration, self._period, self._limits))
-        fault = self._fault(rows, self.options.clearance)
+        fault = self._fault(motion, rows, self.options.clearance, holding)
         if fault:
-            raise OutOfReachError(f"no straight line leads to {metres(point)}: {fault}")
+            raise motion.no_plan(f"no straight line leads to {metres(point)}: {fault}")
         motion.add(name, rows, holding)
 
     def _fingers(self, motion: MotionRows, name: str, opening: float) -> None:
@@ -253,7 +293,7 @@ class ServoArmReaching:
         angles = np.array([self._gripper(opening * float(np.clip(xi / last, 0.0, 1.0))) for xi in path.opening])
         return smoothed(angles + (1.0 - fraction) * (start[-1] - angles[0]), SMOOTHING)
 
-    def _fault(self, rows: Floats, clearance: float) -> str:
+    def _fault(self, motion: MotionRows, rows: Floats, clearance: float, holding: bool) -> str:
         """The obstacle on a path; empty if it is clear."""
         checked = np.concatenate([rows[:-1:_CHECKED_EVERY], rows[-1:]])
         heights, hand = self._clearance.heights(checked), self._arm.forward(checked[:, :-1]).position
@@ -265,15 +305,32 @@ class ServoArmReaching:
         if heights[worst] < minimum[worst]:
             return f"the arm would be {1000 * heights[worst]:.0f} mm above the table at {metres(hand[worst])}"
         touching = self._clearance.touching(checked[:: 2 * _CHECKED_EVERY])
-        return "" if touching is None else f"its {touching[0]} would touch its {touching[1]}"
+        if touching is not None:
+            return f"its {touching[0]} would touch its {touching[1]}"
+        if not len(motion.standing):
+            return ""
+        distance, at, number = self._clearance.to_standing(checked, motion.standing, holding)
+        if distance >= self.options.clearance:
+            return ""
+        motion.in_the_way.add(number)
+        return f"it would come within {1000 * distance:.1f} mm of a standing object at {metres(hand[at])}"
 
     # Positions
 
-    def _begun(self, start: ArrayLike | None) -> MotionRows:
-        angles = self.base_angles if start is None else np.asarray(start, dtype=np.float64)
+    def _begun(self, start: RestPose | None, standing: Floats) -> MotionRows:
+        angles = self.base_angles if start is None else start.angles
         if angles.shape != self.base_angles.shape or not np.isfinite(angles).all():
-            raise ValueError(f"expected a start with the angles of {', '.join(self.joints)}, found {angles.tolist()}")
-        return MotionRows([self._inside(angles)[None]], [np.zeros(1, dtype=bool)])
+            names = ", ".join(self.arm.joints)
+            raise ValueError(f"expected a start with the angles of {names}, found {angles.tolist()}")
+        if len(standing) > MAX_STANDING:
+            raise NoPlanError(f"{len(standing)} objects to keep clear of; at most {MAX_STANDING} at once are possible")
+        outside = np.maximum(self.lower - angles, angles - self.upper)
+        if outside.max() > self.start_tolerance:
+            joint, degrees = self.arm.joints[int(outside.argmax())], np.rad2deg(outside.max())
+            raise NoPlanError(
+                f"joint {joint} stands {degrees:.1f} deg outside its range; disarm, move it by hand, arm again"
+            )
+        return MotionRows([self._inside(angles)[None]], [np.zeros(1, dtype=bool)], standing=standing)
 
     def _finished(self, motion: MotionRows) -> PlannedMotion:
         rows = np.concatenate(motion.rows)
@@ -321,6 +378,7 @@ class ServoReachingOptions:
     speed: float = 0.06  # maximum, of straight lines
     learned_duration: float = 1.6  # minimum, of a learned movement
     longest_duration: float = 6.0  # where a learned movement takes longer, as joints turn far, a milder one is tried
+    grasp_height: float = 0.016  # above the table, at which a held object is put down where the arm was interrupted
     gripper_duration: float = 0.8
     settle_duration: float = 0.4  # time for the closed gripper to press
     work_opening: float = 0.6  # ξ
@@ -333,16 +391,22 @@ class ServoReachingOptions:
 
 @dataclass
 class MotionRows:
-    """A motion under construction: rows of joint angles, rad."""
+    """A motion under construction: rows of joint angles, rad, among standing objects [M, 2], m."""
 
     rows: list[Floats]
     holding: list[NDArray[np.bool_]] = field(default_factory=list)
     phases: list[tuple[str, int]] = field(default_factory=list)
+    standing: Floats = field(default_factory=lambda: NOTHING)
+    in_the_way: set[int] = field(default_factory=set)
 
     @property
     def end(self) -> Floats:
         """The last row [J]."""
         return np.asarray(self.rows[-1][-1])
+
+    def no_plan(self, message: str) -> NoPlanError:
+        """The error that it cannot go on, with the standing objects that prevented a path."""
+        return NoPlanError(message, frozenset(self.in_the_way))
 
     def add(self, name: str, rows: Floats, holding: bool) -> None:
         """Adds rows, of which the first repeats the last existing one."""

@@ -13,10 +13,13 @@ from paramove.demonstrations import train_reaching_model
 from paramove.motion.arm_pose import ArmPoseSolver
 from paramove.motion.clear_plans import ClearPlans
 from paramove.motion.clearance import ClearanceChecker, UprightCylinder, WorkSurface
+from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.modelled_movement import robot_movement
+from paramove.motion.plans import MotionPlans
 from paramove.motion.reaching_file import load_reaching_model
 from paramove.motion.recorded_reaching import people_model
 from paramove.motion.relocation import RelocationPlanner
+from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.motion.synthesizer import Synthesizer
 from paramove.phmm import ParametricHMM
 from paramove.robots import DescriptionError, RobotDescription
@@ -67,7 +70,7 @@ def _cache_folder() -> Path | None:
 
 
 class SurfaceParameters(BaseModel):
-    """The working surface in the shoulder's frame, m, and the upright objects on it."""
+    """A humanoid's working surface in the shoulder's frame, m, and the upright objects on any arm's."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -83,9 +86,12 @@ def synthesizer_for(robot_folder: Path, side: str, movement: MovementSource, sur
     return Synthesizer(plans_for(robot_folder, side, movement, surface))
 
 
-def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> ClearPlans:
-    """The planner of the robot's movements, from files."""
+def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> MotionPlans:
+    """The planner of the robot's movements, from files: of its servo arm, or of its arm on this side."""
     robot = RobotDescription.load(robot_folder)
+    cylinder = UprightCylinder(surface.object_radius, surface.object_height)
+    if robot.chain is not None:
+        return ServoArmReaching(robot, movement.trained(), cylinder=cylinder)
     arm = robot.arm(side)
     solver = ArmPoseSolver(robot, arm)
     converted = robot_movement(movement.trained(), solver.length)
@@ -99,9 +105,8 @@ def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: 
         robot.operating_acceleration[joints],
     )
     box = WorkSurface(surface.x, surface.y, surface.z)
-    cylinder = UprightCylinder(surface.object_radius, surface.object_height)
     try:
         checker = ClearanceChecker(robot, side, box, cylinder)
     except (KeyError, ValueError) as error:
         raise DescriptionError(f"{robot.model_path} does not fit the robot's description: {error}") from error
-    return ClearPlans(planner, checker)
+    return ClearPlans(GripperArm.of(robot, side), planner, checker)

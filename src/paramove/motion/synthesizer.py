@@ -14,23 +14,22 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.arm_state import FELT_OPENING, ArmState
-from paramove.motion.clear_plans import ClearPlans, NoClearPlanError
-from paramove.motion.planned_motion import PlannedMotion, motion_message
-from paramove.motion.reaching_movement import ReachingMovement
+from paramove.motion.planned_motion import PlannedMotion, RestPose, motion_message
+from paramove.motion.plans import MotionPlans, NoPlanError
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
+from paramove.robots import OutOfReachError
 
-FRAME = "right_shoulder"
 FARTHEST = 2.0
 """m; beyond it the inverse kinematics are numerically unusable."""
 LARGEST = 1e6
 RESEND_NS = 400_000_000
 REMEMBERED_GOALS = 200
 STALE_TRIES = 3
-NOT_AT_BASE = "the arm is not at its base pose; send a goal of kind REST first"
+STATUS_TIMEOUT_NS = 10_000_000_000
 RESTARTED = "the synthesizer was restarted; its motion ran to its end; send a new goal"
 
-_ENDED = {TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REJECTED}
+_STOPPED = {TrajectoryStatus.STATE_STOPPED: "stopped", TrajectoryStatus.STATE_REJECTED: "rejected"}
 
 
 @dataclass(frozen=True)
@@ -68,6 +67,7 @@ class _Running:
     message: JointTrajectory | None = None
     acknowledged: bool = False
     sent_ns: int = 0
+    received_ns: int = 0
     time_s: float = 0.0
     phase: str = ""
     motions: int = 0
@@ -79,13 +79,13 @@ class Synthesizer:
     """Executes one goal at a time. Pass messages to the `on_…` methods, then call `tick` once per iteration.
 
     Args:
-        plans: Builds motions from the converted movement that keep clear of table, body and standing objects.
+        plans: Builds motions by the learned movement that keep clear of table, body and standing objects.
     """
 
-    def __init__(self, plans: ClearPlans) -> None:
+    def __init__(self, plans: MotionPlans) -> None:
         self._plans = plans
-        self._arm = plans.planner.arm
-        self._hand = ArmState(self._arm, plans.planner.base_angles)
+        self._arm = plans.arm
+        self._hand = ArmState(self._arm)
         self._running: _Running | None = None
         self._waiting: RelocationGoal | None = None
         self._hulls = _Hulls()
@@ -127,14 +127,16 @@ class Synthesizer:
             self._statuses.append(known)
         elif goal.asked_again:
             self._report(goal.id, RelocationStatus.STATE_FAILED, reason=RESTARTED)
-        elif self._running is None and not self._hand.estimate_pose(self._now_ns):
+        elif self._running is None and not goal.plan_only and not self._hand.estimate_pose(self._now_ns):
             self._waiting = goal
+            self._reject_for_another_arm()
         else:
             self._begin_or_reject(goal)
 
     def on_joint_states(self, message: JointStates) -> None:
         """Updates with the measured joints: the arm's pose, and from the fingers whether an object is held."""
         if not self._hand.handle(message, self._now_ns):
+            self._reject_for_another_arm()
             return
         running = self._running
         if running is not None and running.motion is not None and self._should_hold(running.motion, running.time_s):
@@ -152,13 +154,13 @@ class Synthesizer:
             return
         if not math.isfinite(status.time_s):
             return
-        running.acknowledged = True
+        running.acknowledged, running.received_ns = True, self._now_ns
         running.time_s = status.time_s
         if status.state == TrajectoryStatus.STATE_SUCCEEDED:
             self._next_motion(running)
-        elif status.state in _ENDED:
-            self._hand.forget()
-            self._end(running, _Outcome(False, f"the arm driver ended the motion: {status.reason}"))
+        elif status.state in _STOPPED:
+            reason = status.reason or "it gives no reason"
+            self._stopped(running, f"the arm's driver {_STOPPED[status.state]} the motion: {reason}")
         else:
             self._report_phase(running)
 
@@ -169,6 +171,11 @@ class Synthesizer:
             waiting, self._waiting = self._waiting, None
             self._begin_or_reject(waiting)
         running = self._running
+        if running is not None and now_ns - running.received_ns > STATUS_TIMEOUT_NS:
+            self._stopped(
+                running, f"no status of the motion from the arm's driver for {1e-9 * STATUS_TIMEOUT_NS:.0f} s"
+            )
+            running = None
         unanswered = running is not None and not running.acknowledged and now_ns - running.sent_ns >= RESEND_NS
         if running is not None and running.message is not None and unanswered:
             running.message.captured.FromNanoseconds(now_ns)
@@ -177,6 +184,13 @@ class Synthesizer:
         output = SynthesizerOutput(tuple(self._trajectories), tuple(self._statuses))
         self._trajectories, self._statuses = [], []
         return output
+
+    def _reject_for_another_arm(self) -> None:
+        """A goal that waits for the arm's pose will never get it from the joints of another arm."""
+        if self._waiting is not None and self._hand.missing:
+            missing, waiting, self._waiting = ", ".join(self._hand.missing), self._waiting, None
+            reason = f"the arm has no joint {missing}: give the synthesizer the same `robot` as the arm's driver"
+            self._report(waiting.id, RelocationStatus.STATE_REJECTED, reason=reason)
 
     def _on_status_of_others(self, status: TrajectoryStatus) -> None:
         """A motion that an earlier process began, or one that was abandoned here, moves the arm."""
@@ -187,36 +201,31 @@ class Synthesizer:
 
     # The courses of the goals. Each yields a motion, is resumed when it has been executed, and returns the outcome.
 
-    def _fetch(self, goal: RelocationGoal, then: Callable[[Floats, Floats, Floats], PlannedMotion]) -> _Course:
+    def _fetch(self, goal: RelocationGoal, then: Callable[[RestPose, Floats, Floats], PlannedMotion]) -> _Course:
         source, target, standing = point_of(goal, "from"), point_of(goal, "to"), standing_of(goal)
-        if not self._hand.at_base:
-            raise GoalRejectedError(NOT_AT_BASE)
-        fetch = self._plans.fetch(source, standing)
-        lifted = fetch.gripper[-1]
-        onwards = then(lifted, target, standing)  # known to be possible before the arm moves
+        fetch = self._plans.fetch(source, standing, self._start_of(goal))
+        onwards = then(fetch.end, target, standing)  # known to be possible before the arm moves
         yield fetch
         if not self.holding:
-            yield self._plans.leave(lifted, self._hand.opening, standing)
+            yield self._plans.leave(fetch.end, self._hand.opening, standing)
             return _Outcome(False, f"felt nothing in the hand at {centimetres(source)} cm")
         yield onwards
         return self._placed(target)
 
     def _offer_hand(self, goal: RelocationGoal) -> _Course:
-        if not self._hand.at_base:
-            raise GoalRejectedError(NOT_AT_BASE)
-        yield self._plans.offer(point_of(goal, "from"), standing_of(goal))
+        yield self._plans.reach(point_of(goal, "from"), standing_of(goal), self._start_of(goal))
         return _Outcome(True)
 
     def _take(self, goal: RelocationGoal) -> _Course:
-        here, options = self._waits_at(), self._plans.planner.options
-        yield self._plans.fingers(here, self._hand.opening, options.closed_opening, standing_of(goal))
+        here, plans = self._waits_at(), self._plans
+        yield plans.fingers(here, self._hand.opening, plans.closed_opening, standing_of(goal))
         if self.holding:
             return _Outcome(True)
-        yield self._plans.fingers(here, self._hand.opening, options.offer_opening, standing_of(goal))
+        yield plans.fingers(here, self._hand.opening, plans.offer_opening, standing_of(goal))
         return _Outcome(False, "closed the hand and felt nothing")
 
     def _release(self, goal: RelocationGoal) -> _Course:
-        opening = self._plans.planner.options.offer_opening
+        opening = self._plans.offer_opening
         yield self._plans.fingers(self._waits_at(), self._hand.opening, opening, standing_of(goal))
         return _Outcome(True)
 
@@ -228,10 +237,8 @@ class Synthesizer:
         return self._placed(target)
 
     def _rest(self, goal: RelocationGoal) -> _Course:
-        if self._hand.measured_angles is not None:
-            yield self._plans.home(self._hand.measured_angles, self.holding, standing_of(goal))
-        elif not self._hand.at_base:
-            yield self._plans.leave(self._waits_at(), self._hand.opening, standing_of(goal))
+        if self._hand.pose is not None:
+            yield self._plans.home(self._hand.pose, self._hand.opening, self.holding, standing_of(goal))
         return _Outcome(True)
 
     def _placed(self, target: Floats) -> _Outcome:
@@ -241,13 +248,12 @@ class Synthesizer:
 
     def _begin_or_reject(self, goal: RelocationGoal) -> None:
         if self._running is None:
-            movement = self._plans.planner.movement
-            self._hulls = _Hulls(goal.id, hull_of(goal, "from", movement), hull_of(goal, "to", movement))
+            self._hulls = _Hulls(goal.id, hull_of(goal, "from", self._plans), hull_of(goal, "to", self._plans))
         try:
             self._begin(goal)
-        except (GoalRejectedError, NoClearPlanError, UnreachablePoseError) as error:
+        except _NO_PLAN as error:
             self._report(goal.id, RelocationStatus.STATE_REJECTED, reason=str(error))
-            if isinstance(error, NoClearPlanError):
+            if isinstance(error, NoPlanError):
                 self._latest[goal.id].in_the_way.extend(sorted(error.in_the_way))
 
     def _begin(self, goal: RelocationGoal) -> None:
@@ -255,14 +261,18 @@ class Synthesizer:
             raise GoalRejectedError("a goal without an id; give each goal its own id")
         if self._running is not None:
             raise GoalRejectedError(f"busy with goal {self._running.goal.id}; one goal at a time")
-        if goal.frame != FRAME:
-            raise GoalRejectedError(f"positions in frame {goal.frame!r}; this arm's goals are in {FRAME!r}")
+        if goal.frame != self._arm.frame:
+            raise GoalRejectedError(f"positions in frame {goal.frame!r}; this arm's goals are in {self._arm.frame!r}")
         course = self._courses.get(goal.kind)
         if course is None:
             kinds = [name.removeprefix("KIND_") for name in RelocationGoal.Kind.keys()[1:]]
             raise GoalRejectedError(f"kind {goal.kind} is none of {', '.join(kinds)}")
         running = _Running(goal, course(goal))
         first = self._advance(running)
+        if goal.plan_only:
+            running.course.close()
+            self._report(goal.id, RelocationStatus.STATE_SUCCEEDED, reason="planned from the base pose, not executed")
+            return
         self._running = running
         self._hand.lost = False
         self._report(goal.id, RelocationStatus.STATE_ACCEPTED)
@@ -280,7 +290,7 @@ class Synthesizer:
         self._hand.ended(running.motion)
         try:
             self._start_or_end(running, self._advance(running))
-        except (GoalRejectedError, NoClearPlanError, UnreachablePoseError) as error:
+        except _NO_PLAN as error:
             self._end(running, _Outcome(False, str(error)))
 
     def _start_or_end(self, running: _Running, step: PlannedMotion | _Outcome) -> None:
@@ -290,10 +300,15 @@ class Synthesizer:
         running.motions += 1
         running.motion, running.acknowledged, running.time_s, running.stale = step, False, 0.0, 0
         running.elbow_turn = max(running.elbow_turn, step.elbow_turn)
-        joints = (*self._arm.joints, self._arm.fingers)
-        running.message = motion_message(f"{running.goal.id}/{running.motions}", joints, step, self._now_ns)
-        running.sent_ns = self._now_ns
+        name = f"{running.goal.id}/{running.motions}"
+        running.message = motion_message(name, self._arm.joints, step, self._now_ns)
+        running.sent_ns = running.received_ns = self._now_ns
         self._trajectories.append(running.message)
+
+    def _stopped(self, running: _Running, reason: str) -> None:
+        """The motion ended at an unknown pose."""
+        self._hand.forget()
+        self._end(running, _Outcome(False, reason))
 
     def _end(self, running: _Running, outcome: _Outcome) -> None:
         running.course.close()
@@ -332,16 +347,23 @@ class Synthesizer:
         if running is None or running.motion is None:
             return self._hand.opening
         sample = min(int(np.searchsorted(running.motion.times, running.time_s)), len(running.motion.times) - 1)
-        return self._hand.opening_of(float(running.motion.angles[sample, 5]))
+        return self._arm.opening_of(float(running.motion.angles[sample, -1]))
 
-    def _waits_at(self) -> Floats:
-        if self._hand.gripper is None:
+    def _start_of(self, goal: RelocationGoal) -> RestPose | None:
+        """Where a motion begins; of a goal that is only planned, at the base pose."""
+        return None if goal.plan_only else self._hand.pose
+
+    def _waits_at(self) -> RestPose:
+        if self._hand.pose is None:
             raise GoalRejectedError("the arm is at its base pose; offer the hand first")
-        return self._hand.gripper
+        return self._hand.pose
 
 
 class GoalRejectedError(ValueError):
     """A goal cannot be executed; the message gives the reason and the remedy."""
+
+
+_NO_PLAN = (GoalRejectedError, NoPlanError, UnreachablePoseError, OutOfReachError)
 
 
 def point_of(goal: RelocationGoal, name: str) -> Floats:
@@ -359,10 +381,10 @@ def point_of(goal: RelocationGoal, name: str) -> Floats:
     return point
 
 
-def hull_of(goal: RelocationGoal, name: str, movement: ReachingMovement) -> RelocationStatus.Hull:
+def hull_of(goal: RelocationGoal, name: str, plans: MotionPlans) -> RelocationStatus.Hull:
     """Whether position `name` of a goal lies within the training of the movement; unspecified where it lacks."""
     try:
-        within = movement.within_training(point_of(goal, name))
+        within = plans.within_training(point_of(goal, name))
     except (ArithmeticError, ValueError):  # `point_of` rejects the goal elsewhere; LinAlgError is a ValueError
         return RelocationStatus.HULL_UNSPECIFIED
     if within is None:

@@ -1,4 +1,7 @@
-"""How far a servo arm stays above its table, and whether it touches itself, by its own collision shapes."""
+"""How far a servo arm stays from its table and from standing objects, and whether it touches itself.
+
+By its own collision shapes.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,12 @@ import mujoco
 import numpy as np
 
 from paramove.documents import Floats
+from paramove.motion.clearance import GRASPED_ABOVE_MIDDLE, UprightCylinder
 from paramove.robots import Chain, RobotDescription
+
+MAX_STANDING = 8
+_FAR = 0.05  # larger distances are not distinguished, m
+_HIDDEN = 10.0
 
 
 class TableClearance:
@@ -16,15 +24,33 @@ class TableClearance:
         robot: The robot's description.
         chain: Its arm.
         table_z: Height of the table in the frame of the base, m.
+        cylinder: Shape of the objects that stand on it, one of which may be held.
     """
 
-    def __init__(self, robot: RobotDescription, chain: Chain, table_z: float = 0.0) -> None:
-        self._model = model = mujoco.MjModel.from_xml_path(str(robot.model_path))
+    def __init__(
+        self,
+        robot: RobotDescription,
+        chain: Chain,
+        table_z: float = 0.0,
+        cylinder: UprightCylinder | None = None,
+    ) -> None:
+        self._cylinder = cylinder or UprightCylinder()
+        spec = mujoco.MjSpec.from_file(str(robot.model_path))
+        size = [self._cylinder.radius, self._cylinder.height / 2, 0.0]
+        for name in ("held", *(f"standing_{k}" for k in range(MAX_STANDING))):
+            body = spec.worldbody.add_body(name=name, mocap=True, pos=[_HIDDEN, _HIDDEN, 0.0])
+            body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size, contype=0, conaffinity=0)
+        self._model = model = spec.compile()
         self._data = mujoco.MjData(model)
+        self._upright = [model.geom(f"standing_{k}").id for k in range(MAX_STANDING)]
+        self._held, self._held_body = model.geom("held").id, int(model.body("held").mocapid[0])
         self._qpos = [int(model.joint(name).qposadr[0]) for name in (*chain.joints, chain.gripper)]
         mujoco.mj_forward(model, self._data)
-        self._table = table_z + float(self._data.site(chain.sites.base).xpos[2])
-        self._moving = np.flatnonzero(model.body_weldid[model.geom_bodyid] != 0)
+        self._base = np.array(self._data.site(chain.sites.base).xpos)
+        self._table = table_z + float(self._base[2])
+        self._end_effector = chain.sites.end_effector
+        bodies = model.geom_bodyid
+        self._moving = np.flatnonzero((model.body_weldid[bodies] != 0) & (model.body_mocapid[bodies] < 0))
 
     def heights(self, angles: Floats) -> Floats:
         """Of the arm's lowest moving point above the table, [K], m."""
@@ -45,6 +71,34 @@ class TableClearance:
                     first, second = (self._model.body(body).name for body in bodies)
                     return first, second
         return None
+
+    def to_standing(self, angles: Floats, standing: Floats, holding: bool) -> tuple[float, int, int]:
+        """The closest approach to the objects that stand at `standing` [M, 2], frame of the base, m.
+
+        Returns:
+            The distance, at most 0.05 m; in which row; to which object. A held object is upright.
+        """
+        self._data.mocap_pos[:] = [_HIDDEN, _HIDDEN, 0.0]
+        half = self._cylinder.height / 2
+        for geom, (x, y) in zip(self._upright, standing, strict=False):
+            body = self._model.body_mocapid[self._model.geom_bodyid[geom]]
+            self._data.mocap_pos[body] = [self._base[0] + x, self._base[1] + y, self._table + half]
+        geoms = [*self._moving.tolist(), self._held] if holding else self._moving.tolist()
+        closest = (_FAR, 0, -1)
+        for number, row in enumerate(angles):
+            self._place(row)
+            if holding:
+                hanging = self._data.site(self._end_effector).xpos - [0.0, 0.0, GRASPED_ABOVE_MIDDLE]
+                self._data.mocap_pos[self._held_body] = hanging
+                mujoco.mj_kinematics(self._model, self._data)
+            for k, other in enumerate(self._upright[: len(standing)]):
+                away = np.linalg.norm(self._data.geom_xpos[geoms] - self._data.geom_xpos[other], axis=1)
+                apart = away - self._model.geom_rbound[geoms] - self._model.geom_rbound[other]
+                for geom in np.array(geoms)[apart < closest[0]]:
+                    distance = mujoco.mj_geomDistance(self._model, self._data, int(geom), other, _FAR, None)
+                    if distance < closest[0]:
+                        closest = (distance, number, k)
+        return closest
 
     def _place(self, row: Floats) -> None:
         """Put the joints there, and those that are coupled to them."""

@@ -1,0 +1,65 @@
+"""The interface of planners: motions of an arm with a gripper, from rest to rest and clear of their surroundings."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from paramove.documents import Floats
+from paramove.motion.gripper_arm import GripperArm
+from paramove.motion.planned_motion import PlannedMotion, RestPose
+
+
+class NoPlanError(ValueError):
+    """A motion cannot be planned; the message gives the reason and, where there is one, the nearest possible.
+
+    Attributes:
+        in_the_way: Numbers of the standing objects that every plan would come too close to.
+    """
+
+    def __init__(self, message: str, in_the_way: frozenset[int] = frozenset()) -> None:
+        super().__init__(message)
+        self.in_the_way = in_the_way
+
+
+class MotionPlans(Protocol):
+    """Plans motions of one arm. Positions are of the end effector, [3], m, in the frame of the arm's base.
+
+    `start` and `here` are where the arm rests, None for its base pose; `standing` are positions of other objects,
+    [M, 2]; openings ξ are 0 for a closed gripper to 1. Every method that plans raises NoPlanError or OutOfReachError.
+    """
+
+    @property
+    def arm(self) -> GripperArm:
+        """Its joints and gripper."""
+
+    @property
+    def offer_opening(self) -> float:
+        """ξ while the gripper waits for an object from somebody's hand."""
+
+    @property
+    def closed_opening(self) -> float:
+        """ξ of the gripper that closes on an object, which stops it earlier."""
+
+    def fetch(self, source: Floats, standing: Floats, start: RestPose | None = None) -> PlannedMotion:
+        """Grasp the object at `source` and lift it."""
+
+    def deliver(self, start: RestPose, target: Floats, standing: Floats) -> PlannedMotion:
+        """Carry the held object to `target`, release it, go back to the base pose."""
+
+    def hold(self, start: RestPose, position: Floats, standing: Floats) -> PlannedMotion:
+        """Carry the held object to `position` and stay there."""
+
+    def reach(self, position: Floats, standing: Floats, start: RestPose | None = None) -> PlannedMotion:
+        """Go to `position` with an open gripper and stay there."""
+
+    def fingers(self, here: RestPose, opening: float, end: float, standing: Floats) -> PlannedMotion:
+        """Open or close the gripper where it is."""
+
+    def leave(self, here: RestPose, opening: float, standing: Floats) -> PlannedMotion:
+        """Open the gripper where it is and go back to the base pose."""
+
+    def home(self, here: RestPose, opening: float, holding: bool, standing: Floats) -> PlannedMotion:
+        """Back to the base pose from wherever the arm rests; a held object is put down first."""
+
+    def within_training(self, position: Floats) -> bool | None:
+        """Whether the movement model was trained around this position; None if that is not known."""
