@@ -35,24 +35,26 @@ from typing import Any
 import numpy as np
 import serial
 
+from dynamixel_emulator import DynamixelEmulator
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
 from paramove.robots import RobotDescription
 from paramove.robots.dynamixel import (
     DrivenArm,
-    DynamixelEmulator,
-    EmulatedArm,
     Instruction,
     LoopSettings,
     Packet,
     Timeouts,
-    emulated_servos,
     encoded,
     joint_servos,
     servo_port,
 )
 from paramove.safety import State
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # run as a program, only this folder is known
+
+from sim.emulated_arm import EmulatedArm, emulated_servos
 
 ROOT = Path(__file__).resolve().parent.parent
 GOALS_MS = {"command loss": 100.0, "driver killed": 120.0, "stop": 20.0, "unplugged": 50.0}

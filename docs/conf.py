@@ -12,7 +12,7 @@ project = "paramove"
 author = "the paramove authors"
 extensions = ["myst_parser"]
 root_doc = "docs/index"
-MORE = ["README", "CHANGELOG", "CONTRIBUTING", "msgs/README", "robot_description/*/README"]
+MORE = ["README", "CHANGELOG", "CONTRIBUTING", "msgs/README", "src/*/README", "robot_description/*/README"]
 """Pages outside of docs/."""
 include_patterns = ["docs/**.md", *(f"{page}.md" for page in MORE)]
 myst_enable_extensions = ["dollarmath"]

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.robots import RobotDescription
-from paramove.robots.dynamixel import EmulatedArm
+from sim.emulated_arm import EmulatedArm
 
 SUBSCRIBES = ()
 PUBLISHES = (topics.TRUTH_STATE,)

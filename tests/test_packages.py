@@ -9,7 +9,8 @@ from tests.docs.markdown import table
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "explanation" / "architecture.md"
-LIBRARY = ROOT / "src" / "paramove"
+LIBRARY, EMULATOR = ROOT / "src" / "paramove", ROOT / "src" / "dynamixel_emulator"
+PACKAGES = (LIBRARY, EMULATOR)
 WORKSPACE = ("nodes", "sim", "studies", "benchmarks")
 ALONE = ROOT / "benchmarks" / "foreign_clients"  # programs of others, each with a Python environment of its own
 
@@ -36,7 +37,7 @@ def _imports(path):
 
 def sources():
     """Every file of library and workspace with the module that it is."""
-    for folder, base in ((LIBRARY, LIBRARY.parent), *((ROOT / name, ROOT) for name in WORKSPACE)):
+    for folder, base in (*((one, one.parent) for one in PACKAGES), *((ROOT / name, ROOT) for name in WORKSPACE)):
         for path in sorted(folder.rglob("*.py")):
             if not path.is_relative_to(ALONE) and path.parent != LIBRARY / "msgs":
                 words = path.relative_to(base).with_suffix("").parts
@@ -48,7 +49,7 @@ def test_packages_import_as_the_table_says():
     for path, module in sources():
         for source, names in imports(path):
             assert source.split(".")[0] != "tests", path
-            if source.split(".")[0] in ("paramove", *WORKSPACE) and module != "paramove":
+            if source.split(".")[0] in ("paramove", EMULATOR.name, *WORKSPACE) and module != "paramove":
                 for name in [name for name in names if name != "__version__"] if source == "paramove" else [""]:
                     found[part(module)] |= {name or part(source)} - {part(module)}
     assert found == {row[0]: {word for word in row[2].split(", ") if word != "–"} for row in table(PAGE, "packages")}
@@ -65,7 +66,7 @@ def test_each_row_imports_rows_above_it():
 def offering(module):
     """The package with an interface that a module of the library lies in: the innermost one."""
     words = module.split(".")
-    for length in range(len(words), 1, -1):
+    for length in range(len(words), 0, -1):
         if (LIBRARY.parent.joinpath(*words[:length]) / "__init__.pyi").is_file():
             return ".".join(words[:length])
     return None
@@ -75,13 +76,13 @@ def test_nobody_imports_past_an_interface():
     past = []
     for path, module in sources():
         for source, _ in imports(path):
-            package = offering(source) if source.startswith("paramove.") else None
+            package = offering(source) if source.split(".")[0] in (LIBRARY.name, EMULATOR.name) else None
             if package not in (None, source) and not f"{module}.".startswith(f"{package}."):
                 past.append(f"{path.relative_to(ROOT)}: {source}, which {package} does not offer")
     assert past == []
 
 
 def test_what_is_offered_exists():
-    for stub in LIBRARY.rglob("__init__.pyi"):
+    for stub in LIBRARY.parent.rglob("__init__.pyi"):
         package = importlib.import_module(".".join(stub.parent.relative_to(LIBRARY.parent).parts))
         assert [name for name in package.__all__ if not hasattr(package, name)] == []

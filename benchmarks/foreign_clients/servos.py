@@ -4,11 +4,10 @@ import signal
 import sys
 from pathlib import Path
 
-from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
+from dynamixel_emulator import DynamixelEmulator, EmulatedServo
 
-chain = [EmulatedServo(model, 1 + i, 1_000_000) for i, model in enumerate((XL430_W250, XL330_M288, XL330_M288))]
+MODELS = ("xl430_w250", "xl330_m288", "xl330_m288")
+chain = [EmulatedServo(model, 1 + i, 1_000_000) for i, model in enumerate(MODELS)]
 signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
 with DynamixelEmulator(chain, Path(sys.argv[1]), servo_rules_only=True) as emulator:
     sys.stdout.write(f"{emulator.port}\n")

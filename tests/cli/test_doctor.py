@@ -6,12 +6,11 @@ import json
 import pytest
 from typer.testing import CliRunner
 
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
 from paramove.cli import doctor
 from paramove.cli.main import build
 from paramove.diagnosis.finding import Machine
-from paramove.robots.dynamixel.bus.servo_models import XL430_W250
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 from tests.cli.conftest import call
 
 FAST = 1_000_000
@@ -21,7 +20,7 @@ FAST = 1_000_000
 def emulator(tmp_path):
     """One servo at an adapter with a latency timer of 16 ms; `sys` and `by-id` lie in the test's folder."""
     (tmp_path / "by-id").mkdir()
-    with DynamixelEmulator([EmulatedServo(XL430_W250, 7, FAST)], tmp_path / "by-id" / "usb-adapter") as emulator:
+    with DynamixelEmulator([EmulatedServo("xl430_w250", 7, FAST)], tmp_path / "by-id" / "usb-adapter") as emulator:
         timer = tmp_path / "sys" / "bus" / "usb-serial" / "devices" / emulator.port.rpartition("/")[2]
         timer.mkdir(parents=True)
         (timer / "latency_timer").write_text("16\n")

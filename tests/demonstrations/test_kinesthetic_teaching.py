@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
 from paramove.cli.main import build
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
 from paramove.demonstrations.kinesthetic_teaching import PARAMETERS, KinestheticTeacher, moved_part
@@ -16,10 +18,7 @@ from paramove.motion.timing import minimum_jerk
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
-from paramove.robots.dynamixel.bus.servo_models import model_named
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 from paramove.training.examples import examples_of
 from paramove.training.kinds import untrained
 from paramove.training.training import train_and_write
@@ -72,10 +71,7 @@ class Hands:
 def hands(tmp_path_factory):
     link = tmp_path_factory.mktemp("port") / "port"
     rate = ROBOT.bus.baud_rate
-    servos = [
-        EmulatedServo(model_named(motor), number, rate)
-        for motor, number in zip(ROBOT.motors, ROBOT.servo_ids, strict=True)
-    ]
+    servos = [EmulatedServo(motor, number, rate) for motor, number in zip(ROBOT.motors, ROBOT.servo_ids, strict=True)]
     with DynamixelEmulator(servos, link) as emulator, ServoPort(str(link), rate, latency_s=0.1) as port:
         torque_off = TorqueOffArm(ServoChain(port), ROBOT)
         torque_off.release()

@@ -7,14 +7,13 @@ import time
 
 import pytest
 
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
 from paramove.diagnosis.bus_findings import bus_findings, servo_findings
 from paramove.diagnosis.finding import Level
 from paramove.robots.dynamixel.bus.packets import Instruction, PacketReader
 from paramove.robots.dynamixel.bus.scan import DetectedServo
-from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250, XM430_W350
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 RATES = (57_600, 1_000_000)
 FAST = RATES[1]
@@ -24,12 +23,12 @@ PATIENT_S = 0.5
 
 def wrong_servos():
     """1 twice, 2 with too high a voltage, 3 at another rate, 4 with errors, 5 too hot."""
-    twins = [EmulatedServo(XL430_W250, 1, FAST), EmulatedServo(XL430_W250, 1, FAST)]
+    twins = [EmulatedServo("xl430_w250", 1, FAST), EmulatedServo("xl430_w250", 1, FAST)]
     high, slow, stopped, hot = (
-        EmulatedServo(XL330_M288, 2, FAST),
-        EmulatedServo(XM430_W350, 3, RATES[0]),
-        EmulatedServo(XL430_W250, 4, FAST),
-        EmulatedServo(XL430_W250, 5, FAST),
+        EmulatedServo("xl330_m288", 2, FAST),
+        EmulatedServo("xm430_w350", 3, RATES[0]),
+        EmulatedServo("xl430_w250", 4, FAST),
+        EmulatedServo("xl430_w250", 5, FAST),
     )
     high.voltage = 9.0
     stopped.memory["Hardware Error Status"] = 0x24
@@ -88,7 +87,7 @@ def test_every_servo_is_listed_with_what_it_tells(findings):
 
 
 def test_rates_at_which_nobody_answered_are_not_told_as_found(tmp_path):
-    with DynamixelEmulator([EmulatedServo(XL430_W250, 1, FAST)], tmp_path / "usb"):
+    with DynamixelEmulator([EmulatedServo("xl430_w250", 1, FAST)], tmp_path / "usb"):
         found = bus_findings(tmp_path / "usb", [57600, FAST], PATIENT_S)
     assert found[0].detail == f"usb: 1 servo found at {FAST} bit/s"
 
@@ -147,7 +146,7 @@ def test_the_command_for_a_restart_mends_it(wrong, findings):
 
 
 def test_damaged_answers_are_told(tmp_path):
-    with DynamixelEmulator([EmulatedServo(XL430_W250, 7, FAST)], tmp_path / "usb") as emulator:
+    with DynamixelEmulator([EmulatedServo("xl430_w250", 7, FAST)], tmp_path / "usb") as emulator:
         emulator.faults.damaged = 1.0
         bus, _, seven = bus_findings(tmp_path / "usb", [FAST], PATIENT_S, range(6, 9))
     assert (bus.level, "damaged" in bus.detail) == (Level.PROBLEM, True)
@@ -155,7 +154,7 @@ def test_damaged_answers_are_told(tmp_path):
 
 
 def test_an_echo_is_no_answer(tmp_path):
-    with DynamixelEmulator([EmulatedServo(XL430_W250, 7, FAST)], tmp_path / "usb") as emulator:
+    with DynamixelEmulator([EmulatedServo("xl430_w250", 7, FAST)], tmp_path / "usb") as emulator:
         emulator.faults.echo = True
         found = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
     assert [(one.subject, one.level) for one in found] == [("bus", Level.OK), ("servo 7", Level.OK)]

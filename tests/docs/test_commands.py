@@ -26,8 +26,8 @@ import pytest
 from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
+from dynamixel_emulator.emulator import DynamixelEmulator
 from paramove.cli.main import build
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 from paramove.supervision import parameters
 from tests.docs.command_line import unknown, unknown_study
 from tests.docs.markdown import CONNECT_YOUR_ARM, MARKERS, PAGES, ROOT, Block, blocks

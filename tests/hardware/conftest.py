@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from dynamixel_emulator.emulator import DynamixelEmulator
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.setup import servo_port
-from paramove.robots.dynamixel.emulated.arm import emulated_servos
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from sim.emulated_arm import emulated_servos
 
 ROOT = Path(__file__).parents[2]
 PATIENT_S = 0.3

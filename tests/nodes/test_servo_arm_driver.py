@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dynamixel_emulator.emulator import DynamixelEmulator
 from nodes import servo_arm_driver
 from paramove.bus import topics
 from paramove.bus.bus import Bus
@@ -22,8 +23,7 @@ from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
 from paramove.operator.terminal_arming import request_arming
 from paramove.operator.terminal_stop import stop_arm
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.emulated.arm import emulated_servos
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from sim.emulated_arm import emulated_servos
 
 FOLDER = Path("robot_description/open_manipulator_x")
 ROBOT = RobotDescription.load(FOLDER)

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.emulated.arm import EmulatedArm
+from sim.emulated_arm import EmulatedArm
 
 
 def main() -> None:

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from paramove.robots.dynamixel.bus.servo_models import MODELS
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
 from tests.docs.markdown import CONNECT_YOUR_ARM, blocks
 from tests.docs.terminal import ENVIRONMENT, at_terminal, attended, heard, launched, started
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands
@@ -35,7 +34,7 @@ def test_new_servos_become_an_arm_that_reaches_when_armed_and_stops_when_told(tm
     link.parent.mkdir()
     places = {"PARAMOVE_SERIAL_BY_ID": str(link.parent), "PARAMOVE_DATA": str(tmp_path / "data")}
     environment = ENVIRONMENT | places | {"PARAMOVE_DOMAIN": "connect"}
-    servos = [EmulatedServo(MODELS[one.model]) for one in PLAN.servos]
+    servos = [EmulatedServo(one.model) for one in PLAN.servos]
     with DynamixelEmulator(servos, link) as emulator:
         typed(SETUP, environment, [(connecting(emulator, [servo]), "\n") for servo in servos])
         connecting(emulator, servos)()

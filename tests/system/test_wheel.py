@@ -57,8 +57,10 @@ def test_every_file_of_the_workspace_travels_in_it(installed):
     carried = Workspace((installed / "paramove" / "workspace",)).files()
     tracked = subprocess.run(["git", "ls-files", *PARTS], cwd=ROOT, capture_output=True, text=True, check=True)
     assert {name for name in tracked.stdout.splitlines() if (ROOT / name).is_file()} <= set(carried)
-    assert sorted(path.name for path in installed.iterdir() if path.suffix != ".dist-info") == ["bin", "paramove"]
-    assert (installed / "paramove" / "py.typed").is_file()
+    packages = ["dynamixel_emulator", "paramove"]
+    assert sorted(path.name for path in installed.iterdir() if path.suffix != ".dist-info") == ["bin", *packages]
+    for package in packages:
+        assert (installed / package / "py.typed").is_file()
 
 
 @pytest.mark.parametrize("name", Workspace.at(ROOT).names("launch"))

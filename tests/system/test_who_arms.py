@@ -2,9 +2,9 @@
 
 import pytest
 
+from dynamixel_emulator.emulator import DynamixelEmulator
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.emulated.arm import emulated_servos
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from sim.emulated_arm import emulated_servos
 from tests.docs.terminal import ENVIRONMENT, at_terminal, heard, launched
 from tests.robots.dynamixel.small_arm import LINK
 

@@ -7,11 +7,11 @@ import contextlib
 import pytest
 from typer.testing import CliRunner
 
+from dynamixel_emulator.emulator import DynamixelEmulator
 from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.main import build
 from paramove.robots.dynamixel.bus.servo_setup import only_servo
 from paramove.robots.dynamixel.calibration.path import calibration_path
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands, koch_servos, rest
 from tests.robots.dynamixel.small_arm import LINK, SERIAL
 

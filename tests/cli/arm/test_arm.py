@@ -7,13 +7,12 @@ import json
 import pytest
 from typer.testing import CliRunner
 
+from dynamixel_emulator.servo import EmulatedServo
 from paramove.cli.main import build
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
-from paramove.robots.dynamixel.bus.servo_models import MODELS
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
 from paramove.robots.dynamixel.calibration.path import calibration_path
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 from paramove.safety.gate_io import PERSON_STOP
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands, rest
 from tests.robots.dynamixel.small_arm import LINK, SERIAL
@@ -84,9 +83,9 @@ def test_a_port_in_use_is_told(desk):
 
 def test_setup_gives_one_servo_after_the_other_its_id(desk):
     planned = PLAN.servos[1:3]
-    new = [EmulatedServo(MODELS[one.model], 1, 2_000_000) for one in planned]
+    new = [EmulatedServo(one.model, 1, 2_000_000) for one in planned]
     desk.plug_in(*new)
-    both = [EmulatedServo(MODELS["xl330_m288"], 8, RATE), new[1]]
+    both = [EmulatedServo("xl330_m288", 8, RATE), new[1]]
     steps = [(lambda: desk.connect(new[0]), "\n"), (lambda: desk.connect(*both), "\n")]
     steps += [(lambda: desk.connect(new[1]), "\n")]
     joints = [word for one in planned for word in ("--joint", one.joint)]

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from dynamixel_emulator.servo import EmulatedServo
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
-from paramove.robots.dynamixel.bus.servo_models import MODELS
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands, rest
 
 
 def test_setup_refuses_the_servo_that_it_has_just_set_up(desk):
-    pan, lift = [EmulatedServo(MODELS[one.model], 1, 2_000_000) for one in PLAN.servos[:2]]
+    pan, lift = [EmulatedServo(one.model, 1, 2_000_000) for one in PLAN.servos[:2]]
     desk.plug_in(pan)
     steps = [(rest, "\n"), (rest, "\n"), (lambda: desk.connect(lift), "\n")]
     done = desk.arm("setup", "--robot", KOCH, "--joint", "shoulder_pan", "--joint", "shoulder_lift", steps=steps)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from dynamixel_emulator.emulator import DynamixelEmulator
 from paramove.cli.arm import teach as arm_teach
 from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.main import build
@@ -16,7 +17,6 @@ from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
 from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration, CalibratedBus, JointCalibration
 from paramove.robots.dynamixel.calibration.path import calibration_path
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, koch_servos
 from tests.robots.dynamixel.small_arm import LINK, SERIAL
 

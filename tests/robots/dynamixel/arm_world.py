@@ -2,10 +2,11 @@
 
 import math
 
+from dynamixel_emulator.bus import EmulatedBus
+from dynamixel_emulator.mechanics import DrivenJoint
+from dynamixel_emulator.servo import EmulatedServo
+from dynamixel_emulator.world import MujocoMechanics
 from paramove.robots.dynamixel.bus.packets import Instruction, Packet, encoded
-from paramove.robots.dynamixel.emulated.bus import EmulatedBus
-from paramove.robots.dynamixel.emulated.mechanics import DrivenJoint, MujocoMechanics
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 COUNTS_PER_RAD = 4096 / (2 * math.pi)
 BAUD = 57600

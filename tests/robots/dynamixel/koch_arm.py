@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.robots.dynamixel.bus.servo_models import MODELS
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
 from paramove.robots.dynamixel.calibration.arm_calibration import COUNTS_PER_RAD
 from paramove.robots.dynamixel.calibration.arm_plan import load_plan
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 KOCH = Path(__file__).parents[3] / "robot_description" / "koch_v1_1"
 PLAN = load_plan(KOCH)
@@ -23,7 +22,7 @@ Step = tuple[Callable[[], None], str]
 
 def koch_servos() -> list[EmulatedServo]:
     """As the arm is described."""
-    return [EmulatedServo(MODELS[one.model], one.number, PLAN.baud_rate) for one in PLAN.servos]
+    return [EmulatedServo(one.model, one.number, PLAN.baud_rate) for one in PLAN.servos]
 
 
 def rest() -> None:

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
-from paramove.robots.dynamixel.bus.servo_models import MODELS, PULSES_PER_TURN
+from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.robots.dynamixel.calibration.arm_calibration import (
     COUNTS_PER_RAD,
@@ -19,8 +21,6 @@ from paramove.robots.dynamixel.calibration.arm_calibration import (
     JointCalibration,
 )
 from paramove.robots.dynamixel.calibration.arm_plan import ArmPlan, PlannedServo
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 SERIAL = "FT6Z5NCH"
 LINK = f"usb-FTDI_USB__-__Serial_Converter_{SERIAL}-if00-port0"
@@ -66,9 +66,7 @@ def plugged_in(by_id: Path) -> Iterator[DynamixelEmulator]:
     by_id.mkdir(exist_ok=True)
     servos = []
     for servo in PLAN.servos:
-        servos.append(
-            EmulatedServo(MODELS[servo.model], servo.number, BAUD_RATE, float(ZEROS[servo.joint] % PULSES_PER_TURN))
-        )
+        servos.append(EmulatedServo(servo.model, servo.number, BAUD_RATE, float(ZEROS[servo.joint] % PULSES_PER_TURN)))
     with DynamixelEmulator(servos, by_id / LINK) as emulator:
         yield emulator
 

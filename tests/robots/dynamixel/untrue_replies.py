@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
+from dynamixel_emulator.wire_faults import WireFaults
 from paramove.robots.dynamixel.bus.packets import Packet, decoded, encoded
 from paramove.robots.dynamixel.bus.servo_models import XL430_W250
-from paramove.robots.dynamixel.emulated.wire_faults import WireFaults
 
 POSITION = XL430_W250.registers["Present Position"]
 Replies = list[tuple[float, bytes]]

@@ -56,7 +56,3 @@ from .calibration.procedure import ArmCalibrator as ArmCalibrator
 from .calibration.servo_settings import adopted as adopted
 from .calibration.servo_settings import compare as compare
 from .calibration.servo_settings import write_settings as write_settings
-from .emulated.arm import EmulatedArm as EmulatedArm
-from .emulated.arm import emulated_servos as emulated_servos
-from .emulated.emulator import DynamixelEmulator as DynamixelEmulator
-from .emulated.servo import EmulatedServo as EmulatedServo

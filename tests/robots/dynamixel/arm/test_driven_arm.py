@@ -11,6 +11,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynamixel_emulator.body import HardwareError
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
+from dynamixel_emulator.wire_faults import WireFaults
 from paramove.bus import topics
 from paramove.documents.input_error import InputError
 from paramove.msgs.safety_state_pb2 import StopRequest
@@ -20,13 +24,8 @@ from paramove.robots.dynamixel.arm.servo_arm import ServoArm, Timeouts
 from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
 from paramove.robots.dynamixel.arm.setup import joint_servos, servo_port
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
-from paramove.robots.dynamixel.bus.servo_models import XL430_W250
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
-from paramove.robots.dynamixel.emulated.arm import emulated_servos
-from paramove.robots.dynamixel.emulated.body import HardwareError
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
-from paramove.robots.dynamixel.emulated.wire_faults import WireFaults
+from sim.emulated_arm import emulated_servos
 from tests.robots.dynamixel.person import Person
 from tests.robots.dynamixel.untrue_replies import OneElsewhere
 
@@ -293,7 +292,7 @@ def test_a_second_servo_of_one_id_stops_the_arm(person):
     person.port.latency_s = 0.02
     person.moves()
     with person.emulator.lock:
-        person.emulator.bus.add(EmulatedServo(XL430_W250, 12, 1_000_000))
+        person.emulator.bus.add(EmulatedServo("xl430_w250", 12, 1_000_000))
     person.waits_for("HOLD")
     assert person.codes()[0] in (("joint_silent", "joint2"), ("bus_noise", ""))
     told = person.safety.faults[0].detail

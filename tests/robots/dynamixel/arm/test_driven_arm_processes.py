@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dynamixel_emulator.emulator import DynamixelEmulator
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
 from paramove.robots.dynamixel.arm.servo_arm import Timeouts
 from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
 from paramove.robots.dynamixel.arm.setup import joint_servos, servo_port
-from paramove.robots.dynamixel.emulated.arm import emulated_servos
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from sim.emulated_arm import emulated_servos
 from tests.robots.dynamixel.person import PATIENT_S, Person
 
 ROOT = Path(__file__).parents[4]

@@ -4,13 +4,13 @@ import mujoco
 import numpy as np
 import pytest
 
+from dynamixel_emulator.memory import TRIPPED
 from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.arm.gravity_compensated_arm import ArmWeight, GravityCompensatedArm
 from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
-from paramove.robots.dynamixel.bus.servo_memory import TRIPPED
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
-from paramove.robots.dynamixel.emulated.arm import EmulatedArm
+from sim.emulated_arm import EmulatedArm
 from tests.robots.servo_arms import KOCH, OPEN_MANIPULATOR_X
 
 ROBOT = OPEN_MANIPULATOR_X

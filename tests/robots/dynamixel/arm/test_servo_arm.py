@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
+from dynamixel_emulator.wire_faults import WireFaults
 from paramove.robots.dynamixel.arm.servo_arm import ServoArm, Timeouts
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoRejectedError
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.bus.servo_port import PortLostError, ServoPort
 from paramove.robots.dynamixel.calibration.arm_calibration import JointCalibration
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
-from paramove.robots.dynamixel.emulated.wire_faults import WireFaults
 
 BAUD_RATE = 1_000_000
 PATIENT_S, PERIOD_S, WATCHDOG_UNITS = 0.3, 1.0, 127

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.wire_faults import WireFaults
 from paramove.documents.input_error import InputError
 from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.robots.description import DescriptionError, RobotDescription
 from paramove.robots.dynamixel.arm.servo_arm import Timeouts
 from paramove.robots.dynamixel.arm.setup import ServoArmSetup, calibrated, joint_servos, servo_port, uncalibrated
 from paramove.robots.dynamixel.calibration.arm_calibration import CalibrationError, JointCalibration
-from paramove.robots.dynamixel.emulated.arm import emulated_servos
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.wire_faults import WireFaults
 from paramove.robots.this_launch import ThisLaunch
+from sim.emulated_arm import emulated_servos
 from tests.robots.dynamixel.person import Person
 from tests.robots.dynamixel.small_arm import calibration
 

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from dynamixel_emulator.wire_faults import WireFaults
 from paramove.robots.dynamixel.bus.bench import bench_bus, held_rates, latency_timer_ms, slow_timer
-from paramove.robots.dynamixel.emulated.wire_faults import WireFaults
 from tests.robots.dynamixel.small_arm import small_arm
 
 

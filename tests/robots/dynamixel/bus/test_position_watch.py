@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from dynamixel_emulator.emulator import DynamixelEmulator
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.servo_arm import ServoArm
 from paramove.robots.dynamixel.arm.setup import joint_servos, servo_port
@@ -12,8 +13,7 @@ from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
 from paramove.robots.dynamixel.bus.position_watch import NOISE, PositionWatch
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_models import XL430_W250
-from paramove.robots.dynamixel.emulated.arm import emulated_servos
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from sim.emulated_arm import emulated_servos
 from tests.robots.dynamixel.untrue_replies import OneAsTheNext, OneElsewhere
 
 ROBOT = RobotDescription.load("robot_description/open_manipulator_x")

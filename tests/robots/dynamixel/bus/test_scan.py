@@ -2,18 +2,17 @@
 
 import pytest
 
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
+from dynamixel_emulator.wire_faults import WireFaults
 from paramove.robots.dynamixel.bus.hardware_error import error_text
 from paramove.robots.dynamixel.bus.packets import Instruction, Packet, PacketReader
 from paramove.robots.dynamixel.bus.scan import USUAL_BAUD_RATES, BusScan, scan_bus
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
-from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250, XM430_W350
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
-from paramove.robots.dynamixel.emulated.wire_faults import WireFaults
 
 LATENCY_S = 0.1
-PAIRED = ((XL330_M288, 1), (XL430_W250, 3), (XL330_M288, 3))
+PAIRED = (("xl330_m288", 1), ("xl430_w250", 3), ("xl330_m288", 3))
 
 
 RATE = 1_000_000
@@ -57,9 +56,9 @@ def faults_by_id(found):
 
 def test_servos_of_all_baud_rates_are_found():
     servos = [
-        EmulatedServo(XL430_W250, 1, 57600),
-        EmulatedServo(XL330_M288, 2, 1_000_000),
-        EmulatedServo(XM430_W350, 1, 4_000_000),
+        EmulatedServo("xl430_w250", 1, 57600),
+        EmulatedServo("xl330_m288", 2, 1_000_000),
+        EmulatedServo("xm430_w350", 1, 4_000_000),
     ]
     servos[1].memory["Hardware Error Status"] = 0x24
     servos[2].memory["Torque Enable"] = 1
@@ -77,7 +76,7 @@ def test_servos_of_all_baud_rates_are_found():
 
 
 def test_a_model_that_only_the_sdk_knows_is_told_with_its_state_and_another_by_its_number():
-    servos = [EmulatedServo(XL430_W250, number, RATE) for number in (1, 2)]
+    servos = [EmulatedServo("xl430_w250", number, RATE) for number in (1, 2)]
     servos[0].memory["Model Number"], servos[1].memory["Model Number"] = 1080, 9
     known, unknown = scanned(servos, (RATE,)).servos
     assert (known.name, known.table, known.voltage, known.torque) == ("xc430_w240", None, 11.1, False)
@@ -86,7 +85,7 @@ def test_a_model_that_only_the_sdk_knows_is_told_with_its_state_and_another_by_i
 
 
 def test_another_baud_rate_than_configured_is_told():
-    found = scanned([EmulatedServo(XL430_W250, number) for number in range(1, 6)], (57600, 1_000_000))
+    found = scanned([EmulatedServo("xl430_w250", number) for number in range(1, 6)], (57600, 1_000_000))
     assert found.findings(1_000_000) == ["found 5 servos at 57600, configured 1000000"]
     assert found.findings(57600) == found.findings() == []
 
@@ -96,7 +95,7 @@ PROBABLY = "answers with damaged bytes: probably two servos have this ID"
 
 def test_two_servos_of_one_id_are_told():
     """Of the same model: to a ping both say the same, but they do not stand in the same place."""
-    servos = [EmulatedServo(XL330_M288, number, RATE) for number in (1, 2, 2)]
+    servos = [EmulatedServo("xl330_m288", number, RATE) for number in (1, 2, 2)]
     servos[2].temperature, servos[2].voltage = 41.0, 4.6
     found = scanned(servos, (RATE,), range(5))
     assert [(one.number, one.has_duplicate_id) for one in found.servos] == [(1, False), (2, True)]
@@ -121,7 +120,7 @@ def test_two_servos_of_one_id_that_answer_one_after_the_other_are_counted():
     def twice(receive):
         return lambda *heard: [answer for one in receive(*heard) for answer in (one, one)]
 
-    found = scanned([EmulatedServo(XL330_M288, 2, RATE)], (RATE,), receive=twice)
+    found = scanned([EmulatedServo("xl330_m288", 2, RATE)], (RATE,), receive=twice)
     assert faults_by_id(found) == {2: "answers 2 times to one question: 2 servos have this ID"}
 
 
@@ -134,13 +133,13 @@ def test_an_id_whose_reads_alone_are_damaged_is_told():
 
         return damaged
 
-    found = scanned([EmulatedServo(XL330_M288, 2, RATE)], (RATE,), receive=damaged_reads)
+    found = scanned([EmulatedServo("xl330_m288", 2, RATE)], (RATE,), receive=damaged_reads)
     assert faults_by_id(found)[2].startswith(PROBABLY)
     assert found.servos[0].model == "xl330_m288"
 
 
 def test_a_servo_that_answers_to_pings_alone_is_told():
-    servo = EmulatedServo(XL330_M288, 2, RATE)
+    servo = EmulatedServo("xl330_m288", 2, RATE)
     servo.memory["Status Return Level"] = 0
     (finding,) = scanned([servo], (RATE,)).findings()
     assert finding.startswith(f"ID 2 at {RATE} failed in 3 of 3 reads")
@@ -148,14 +147,14 @@ def test_a_servo_that_answers_to_pings_alone_is_told():
 
 
 def test_damaged_answers_are_told():
-    found = scanned([EmulatedServo(XL430_W250, 2, RATE)], (RATE,), range(4), faults=WireFaults(damaged=1.0, seed=1))
+    found = scanned([EmulatedServo("xl430_w250", 2, RATE)], (RATE,), range(4), faults=WireFaults(damaged=1.0, seed=1))
     assert found.damaged == [RATE]
     assert found.findings()[0].startswith(f"answers at {RATE} bit/s are damaged")
     assert faults_by_id(found)[2].startswith(PROBABLY)
 
 
 def test_noise_around_sound_answers_is_no_fault():
-    servos = [EmulatedServo(XL430_W250, number, RATE) for number in (1, 2)]
+    servos = [EmulatedServo("xl430_w250", number, RATE) for number in (1, 2)]
     found = scanned(servos, (RATE,), range(4), faults=WireFaults(noisy=1.0))
     assert faults_by_id(found) == {1: "", 2: ""}
     assert found.findings() == []
@@ -173,7 +172,7 @@ def test_one_disturbance_makes_no_servo():
 
 def test_damage_now_and_then_is_told_as_failed_reads():
     """Also where a sound answer comes with it: it may be another servo's."""
-    servos = [EmulatedServo(XL430_W250, 2, RATE)]
+    servos = [EmulatedServo("xl430_w250", 2, RATE)]
 
     def damaged_once(receive):
         spoilt = iter([False, True])
@@ -195,7 +194,7 @@ def test_another_device_is_told_and_not_taken_for_servos():
 
 
 def test_an_echo_is_no_answer():
-    servos = [EmulatedServo(XL430_W250, 2, RATE)]
+    servos = [EmulatedServo("xl430_w250", 2, RATE)]
     assert faults_by_id(scanned(servos, (RATE,), faults=WireFaults(echo=True))) == {2: ""}
 
 
@@ -208,12 +207,12 @@ def test_a_baud_rate_that_the_adapter_does_not_have_is_passed_over(monkeypatch):
         return set_rate(port, rate)
 
     monkeypatch.setattr(ServoPort, "setBaudRate", reject)
-    found = scanned([EmulatedServo(XL330_M288, 1, 1_000_000)], (4_000_000, 1_000_000))
+    found = scanned([EmulatedServo("xl330_m288", 1, 1_000_000)], (4_000_000, 1_000_000))
     assert ([one.number for one in found.servos], found.asked) == ([1], [RATE])
 
 
 def test_a_silent_bus_has_no_servos():
-    assert scanned([EmulatedServo(XL330_M288, 1, 9600)], (RATE,)) == BusScan(asked=[RATE])
+    assert scanned([EmulatedServo("xl330_m288", 1, 9600)], (RATE,)) == BusScan(asked=[RATE])
 
 
 def test_unknown_bits_of_the_error_are_named():

@@ -5,6 +5,9 @@ from threading import Event, Timer
 
 import pytest
 
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
+from dynamixel_emulator.wire_faults import WireFaults
 from paramove.robots.dynamixel.bus.servo_chain import (
     ATTEMPTS_S,
     PingedServo,
@@ -14,9 +17,6 @@ from paramove.robots.dynamixel.bus.servo_chain import (
 )
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
-from paramove.robots.dynamixel.emulated.wire_faults import WireFaults
 
 BAUD_RATE = 1_000_000
 REGISTERS = XL430_W250.registers
@@ -29,7 +29,7 @@ PLACES = {1: 1000.0, 2: 2000.0, 3: 3000.0}
 @pytest.fixture
 def emulator():
     models = {1: XL430_W250, 2: XL330_M288, 3: XL330_M288}
-    servos = [EmulatedServo(models[number], number, BAUD_RATE, place) for number, place in PLACES.items()]
+    servos = [EmulatedServo(models[number].name, number, BAUD_RATE, place) for number, place in PLACES.items()]
     with DynamixelEmulator(servos) as emulator:
         yield emulator
 

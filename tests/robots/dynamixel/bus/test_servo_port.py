@@ -9,11 +9,10 @@ import sys
 import pytest
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
 
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
 from paramove.documents.input_error import InputError
-from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.bus.servo_port import LATENCY_S, PortLostError, ServoPort
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 INDIRECT_DATA = 224
 PATIENT_S = 0.3
@@ -59,7 +58,7 @@ def said_by(code, *arguments):
 
 @pytest.fixture
 def emulator():
-    with DynamixelEmulator([EmulatedServo(XL430_W250, 1, 1_000_000), EmulatedServo(XL330_M288, 2)]) as emulator:
+    with DynamixelEmulator([EmulatedServo("xl430_w250", 1, 1_000_000), EmulatedServo("xl330_m288", 2)]) as emulator:
         yield emulator
 
 

@@ -2,13 +2,13 @@
 
 import pytest
 
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.servo import EmulatedServo
 from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
-from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, XL330_M288, XL430_W250
+from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, XL430_W250
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.robots.dynamixel.bus.servo_setup import only_servo, set_up
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 RATES = (2_000_000, 1_000_000)
 
@@ -33,7 +33,7 @@ def connected():
 
 @pytest.mark.parametrize("before", [(1, 2_000_000), (7, 2_000_000), (3, 2_000_000), (1, 1_000_000)])
 def test_a_servo_is_set_up_from_any_id_and_baud_rate(connected, before):
-    servo = EmulatedServo(XL330_M288, *before)
+    servo = EmulatedServo("xl330_m288", *before)
     servo.memory["Torque Enable"] = 1  # its settings are locked until it is off
     chain, _ = connected(servo)
     found = set_up(chain, only_servo(chain, RATES), 3, 1_000_000, "xl330_m288")
@@ -43,17 +43,17 @@ def test_a_servo_is_set_up_from_any_id_and_baud_rate(connected, before):
 
 
 def test_two_servos_are_refused(connected):
-    chain, emulator = connected(EmulatedServo(XL330_M288, 1, 2_000_000), EmulatedServo(XL330_M288, 4, 1_000_000))
+    chain, emulator = connected(EmulatedServo("xl330_m288", 1, 2_000_000), EmulatedServo("xl330_m288", 4, 1_000_000))
     with pytest.raises(InputError, match=r"exactly one servo .*found ID 1 \(xl330_m288\), ID 4 .*connect one alone"):
         only_servo(chain, RATES)
-    chain, emulator = connected(EmulatedServo(XL330_M288, 1, 2_000_000), EmulatedServo(XL330_M288, 1, 2_000_000))
+    chain, emulator = connected(EmulatedServo("xl330_m288", 1, 2_000_000), EmulatedServo("xl330_m288", 1, 2_000_000))
     emulator.bus.servos[1].temperature = 45.0
     with pytest.raises(InputError, match=r"found ID 1 \(.*probably two servos have this ID.*connect one alone"):
         only_servo(chain, RATES, range(4))
 
 
 def test_no_servo_is_told(connected):
-    chain, _ = connected(EmulatedServo(XL330_M288, 1, 9600))
+    chain, _ = connected(EmulatedServo("xl330_m288", 1, 9600))
     with pytest.raises(InputError, match=r"found none at 2000000, 1000000: check its power"):
         only_servo(chain, RATES)
 
@@ -67,7 +67,7 @@ def test_no_servo_is_told(connected):
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_is_written(connected, number, baud_rate, model, told):
-    servo = EmulatedServo(XL330_M288, 1, 2_000_000)
+    servo = EmulatedServo("xl330_m288", 1, 2_000_000)
     chain, _ = connected(servo)
     before = bytes(servo.memory.read(0, 64))
     with pytest.raises(InputError, match=told):
@@ -76,7 +76,7 @@ def test_what_cannot_be_is_refused_before_anything_is_written(connected, number,
 
 
 def test_a_value_that_does_not_stay_is_told(connected, monkeypatch):
-    servo = EmulatedServo(XL430_W250, 1, 2_000_000)
+    servo = EmulatedServo("xl430_w250", 1, 2_000_000)
     chain, _ = connected(servo)
     found = only_servo(chain, RATES)
     write = chain.write

@@ -12,8 +12,7 @@ from paramove.robots import RobotDescription
 from paramove.robots.dynamixel.arm.servo_arm import WATCHDOG_UNIT_S
 from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError
-from paramove.robots.dynamixel.bus.servo_memory import CURRENT_MODE
-from paramove.robots.dynamixel.bus.servo_models import model_named
+from paramove.robots.dynamixel.bus.servo_models import CURRENT_MODE, model_named
 from paramove.robots.dynamixel.bus.servo_port import PortLostError
 
 WATCHDOG_S = 0.2

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from paramove.documents import Floats, InputError
 from paramove.robots import INT16_RANGE
 from paramove.robots.dynamixel.arm.servo_checks import (
-    ENDS,
     JointServo,
     arming_faults,
     bus_fault,
@@ -279,8 +278,7 @@ class ServoArm:
         fault = None
         for servo, health, (tenths, temperature) in self._read_each("Present Input Voltage", "Present Temperature"):
             health.voltage, health.temperature = 0.1 * tenths, temperature
-            low, high = (0.1 * servo.model.registers[f"{end} Voltage Limit"].initial for end in ENDS)
-            fault = fault or voltage_fault(servo, health.voltage, low, high)
+            fault = fault or voltage_fault(servo, health.voltage, *servo.model.voltage_limits)
         return fault
 
     def look_after_watchdogs(self) -> Fault | None:
@@ -317,7 +315,7 @@ class ServoArm:
         """Messages about values close to a fault."""
         messages = []
         for servo in self.servos:
-            voltage, low = self.health[servo.joint].voltage, 0.1 * servo.model.registers["Min Voltage Limit"].initial
+            voltage, low = self.health[servo.joint].voltage, servo.model.voltage_limits[0]
             if voltage is not None and voltage < (1.0 + LOW_VOLTAGE_MARGIN) * low:
                 messages.append(
                     f"{servo.joint} has {voltage:.1f} V, its limit is {low:.1f} V: charge or check the supply"

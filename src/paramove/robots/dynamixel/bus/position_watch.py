@@ -128,4 +128,4 @@ def difference(later: int, earlier: int) -> int:
 
 def _top_speed(model: ServoModel) -> float:
     """Pulses per second without load at the maximum voltage of the model."""
-    return model.top_speed / 60.0 * PULSES_PER_TURN * 0.1 * model.registers["Max Voltage Limit"].initial / model.voltage
+    return model.top_speed / 60.0 * PULSES_PER_TURN * model.voltage_limits[1] / model.voltage

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from paramove.documents import InputError
 from paramove.robots.dynamixel.bus.scan import ALL_IDS, USUAL_BAUD_RATES, DetectedServo, listed, scan_bus
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoTimeoutError
-from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, ServoModel
+from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, MAX_ID, ServoModel
 
 NO_DELAY = 0
 """Of Return Delay Time (9): replies come at once, which a fast bus needs."""
@@ -77,10 +77,9 @@ def _checked(servo: DetectedServo, number: int, baud_rate: int, model: str) -> S
     table = servo.table
     if table is None:
         raise InputError(f"the table of {servo.name} is unknown here: set it up with its maker's tool")
-    low, high = table.registers["ID"].allowed or (0, 0)
-    if not (low or 0) <= number <= (high or 0):
-        raise InputError(f"an ID is {low} to {high}, found {number}")
-    rates = BAUD_RATES[: 1 + ((table.registers["Baud Rate"].allowed or (0, 0))[1] or 0)]
-    if baud_rate not in rates:
-        raise InputError(f"{table.name} has the baud rates {', '.join(map(str, rates))}, found {baud_rate}")
+    if not 0 <= number <= MAX_ID:
+        raise InputError(f"an ID is 0 to {MAX_ID}, found {number}")
+    if baud_rate not in table.baud_rates:
+        rates = ", ".join(map(str, table.baud_rates))
+        raise InputError(f"{table.name} has the baud rates {rates}, found {baud_rate}")
     return table

@@ -1,0 +1,148 @@
+"""A servo arm of `robot_description/` in its scene, behind an emulated port: all that a driver of the arm needs."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import mujoco
+import numpy as np
+
+from dynamixel_emulator import (
+    CURRENT_BASED_POSITION_MODE,
+    ControlSocket,
+    DrivenJoint,
+    DynamixelEmulator,
+    EmulatedServo,
+    EmulatorError,
+    FaultCommands,
+    MujocoMechanics,
+    WireFaults,
+)
+from paramove.documents import InputError
+from paramove.msgs.truth_pb2 import TruthState
+from paramove.robots import RobotDescription
+
+
+class EmulatedArm:
+    """Open while it is a context.
+
+    Args:
+        robot: Its joints have servos; a motor's name is that of the servo's model.
+        scene: World in which it stands, MJCF, or the name of a file beside the arm's own model.
+        link: Name of the port; folders above it are made.
+        control: Where lines of `FaultCommands` are taken; None: nowhere.
+        posture_deg: Of joints at the start; others begin in the base pose.
+        seed: Of faults on the wire, when there are any.
+        held: Whether the servos hold at the start, as a program before has left them; else the arm falls at once.
+        servo_rules_only: Whether the judge finds only what the servos themselves reject.
+    """
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        scene: Path = Path("scene.xml"),
+        link: Path | None = None,
+        control: Path | None = None,
+        posture_deg: Mapping[str, float] | None = None,
+        seed: int = 0,
+        held: bool = False,
+        servo_rules_only: bool = False,
+    ) -> None:
+        pose = dict(zip(robot.joint_names, robot.base_pose.tolist(), strict=True))
+        for name, degrees in (posture_deg or {}).items():
+            pose[robot.joint_names[robot.index(name)]] = float(np.deg2rad(degrees))
+        units = robot.units
+        joints = [
+            DrivenJoint(name, counts, zero)
+            for name, counts, zero in zip(
+                robot.joint_names, units.counts_per_rad.tolist(), units.zero_counts.tolist(), strict=True
+            )
+        ]
+        self.robot = robot
+        self._servos = emulated_servos(robot)
+        with _as_input_errors():
+            self.mechanics = MujocoMechanics(robot.model_path.parent / scene, joints, pose)
+        self._joints = dict(zip(robot.servo_ids, joints, strict=True))
+        self._objects = _free_bodies(self.mechanics.model)
+        self._link, self._control, self._seed, self._held = link, control, seed, held
+        self._servo_rules_only = servo_rules_only
+        self._open = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        with contextlib.ExitStack() as opened, _as_input_errors():
+            if self._link is not None:
+                self._link.parent.mkdir(parents=True, exist_ok=True)
+            emulator = DynamixelEmulator(self._servos, self._link, self.mechanics, self._servo_rules_only)
+            self.emulator = opened.enter_context(emulator)
+            self.emulator.faults = WireFaults(seed=self._seed)
+            with self.emulator.lock:
+                for servo in self._servos if self._held else ():
+                    servo.hold()
+            if self._control is not None:
+                names = dict(zip(self.robot.joint_names, self.robot.servo_ids, strict=True))
+                opened.enter_context(ControlSocket(self._control, FaultCommands(self.emulator, names, self._joints).do))
+            self._open = opened.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self._open.close()
+
+    @property
+    def detail(self) -> str:
+        """What there is, in a few words."""
+        port = self._link or self.emulator.port
+        plugged = f"at {port}" if self.emulator.plugged_in else f"unplugged from {port}"
+        judge = self.emulator.bus.judge
+        found = ", ".join(f"{count} {kind}" for kind, count in sorted(judge.counts.items())) or "nothing wrong"
+        return f"{self.robot.name} {plugged}; {judge.packets} packets, {found}"
+
+    def truth(self, now_ns: int) -> TruthState:
+        """Where everything is: joints in the order of the description, the end effector, and what lies about."""
+        with self.emulator.lock:
+            data = self.mechanics.data
+            message = TruthState(time_ns=now_ns, joint_positions=self.mechanics.angles(self.robot.joint_names))
+            if self.robot.chain is not None:
+                message.gripper.extend(data.site(self.robot.chain.sites.end_effector).xpos.tolist())
+            for name in self._objects:
+                x, y, z = data.body(name).xpos.tolist()
+                message.objects.add(
+                    name=name, x=x, y=y, z=z, quaternion_xyzw=data.body(name).xquat[[1, 2, 3, 0]].tolist()
+                )
+        return message
+
+
+@contextlib.contextmanager
+def _as_input_errors() -> Iterator[None]:
+    """Errors of the emulator, which is a package of its own, as those of paramove."""
+    try:
+        yield
+    except EmulatorError as error:
+        raise InputError(str(error), missing=error.missing) from error
+
+
+def emulated_servos(robot: RobotDescription) -> list[EmulatedServo]:
+    """Servos as `paramove arm setup` leaves them, in the order of its joints, standing in the base pose.
+
+    Raises:
+        InputError: The robot is no arm of servos.
+    """
+    if robot.bus is None or len(robot.servo_ids) != robot.n_joints:
+        raise InputError(f"{robot.name} is no arm of servos: its robot.yaml has no bus, or joints without servo_id")
+    rows = zip(robot.motors, robot.servo_ids, robot.units.to_counts(robot.base_pose), strict=True)
+    servos = [EmulatedServo(motor, number, robot.bus.baud_rate, float(count)) for motor, number, count in rows]
+    for servo in servos:
+        servo.preset("Return Delay Time", 0)
+    if robot.chain is not None and robot.chain.grip_current_ma is not None:
+        servos[robot.chain.gripper_index].preset("Operating Mode", CURRENT_BASED_POSITION_MODE)
+    return servos
+
+
+def _free_bodies(model: mujoco.MjModel) -> list[str]:
+    free = [joint for joint in range(model.njnt) if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE]
+    return [str(model.body(model.jnt_bodyid[joint]).name) for joint in free]

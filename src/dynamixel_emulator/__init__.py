@@ -1,0 +1,5 @@
+"""Emulated Dynamixel servos: a serial port whose servos speak Protocol 2.0, byte by byte."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,14 @@
+from .control import ControlSocket as ControlSocket
+from .control import request as request
+from .emulator import DynamixelEmulator as DynamixelEmulator
+from .errors import EmulatorError as EmulatorError
+from .fault_commands import FaultCommands as FaultCommands
+from .mechanics import DrivenJoint as DrivenJoint
+from .memory import CURRENT_BASED_POSITION_MODE as CURRENT_BASED_POSITION_MODE
+from .models import BAUD_RATES as BAUD_RATES
+from .models import MODELS as MODELS
+from .models import ServoModel as ServoModel
+from .protocol_checker import ProtocolChecker as ProtocolChecker
+from .servo import EmulatedServo as EmulatedServo
+from .wire_faults import WireFaults as WireFaults
+from .world import MujocoMechanics as MujocoMechanics

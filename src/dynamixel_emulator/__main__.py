@@ -1,0 +1,3 @@
+from dynamixel_emulator.commands import main
+
+raise SystemExit(main())

@@ -1,0 +1,128 @@
+"""Emulates Dynamixel servos behind a serial port.
+
+    dynamixel-emulator koch --port ./koch-port                 an arm by its name, until Ctrl-C
+    dynamixel-emulator xl430_w250:1 xl330_m288:2               any servos, as MODEL:ID
+    dynamixel-emulator fault unplug --port ./koch-port         inject a fault into a running emulator
+    dynamixel-emulator status --port ./koch-port               its servos, and what its protocol checker has counted
+
+Exit codes: 0; 2 wrong arguments; 66 what is named does not exist; 78 it cannot be used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from dynamixel_emulator.arms import ARMS, BAUD_RATE, chain_of
+from dynamixel_emulator.control import ControlSocket, request
+from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.errors import EmulatorError
+from dynamixel_emulator.fault_commands import VERBS, FaultCommands
+from dynamixel_emulator.models import MODELS
+
+PORT = Path("dynamixel-port")
+MISSING, UNUSABLE = 66, 78
+SHOWN_S = 0.5
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    commands = {"fault": _fault, "status": _status}
+    try:
+        return commands[words[0]](words[1:]) if words and words[0] in commands else _emulate(words)
+    except EmulatorError as error:
+        sys.stderr.write(f"{error}\n")
+        return MISSING if error.missing else UNUSABLE
+
+
+def _parser(usage: str, description: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        f"dynamixel-emulator {usage}".strip(),
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--port", type=Path, default=PORT, metavar="LINK", help="the port (default: %(default)s)")
+    return parser
+
+
+def _emulate(words: list[str]) -> int:
+    parser = _parser("", __doc__ or "")
+    parser.add_argument("servos", nargs="+", help=f"{', '.join(ARMS)}, or MODEL:ID of {', '.join(sorted(MODELS))}")
+    parser.add_argument("--baud-rate", type=int, default=BAUD_RATE, help="bit/s (default: %(default)s)")
+    parser.add_argument(
+        "--world", type=Path, metavar="MJCF", help="a MuJoCo model whose joints have the names of the arm's"
+    )
+    parser.add_argument(
+        "--servo-rules-only", action="store_true", help="count only packets that servos reject, not goals that jump"
+    )
+    options = parser.parse_args(words)
+    chain = chain_of(options.servos, options.baud_rate)
+    joints = chain.joints()
+    mechanics = None
+    if options.world is not None:
+        from dynamixel_emulator.world import MujocoMechanics  # MuJoCo is needed for a world only
+
+        mechanics = MujocoMechanics(options.world, joints)
+    stops = {signal.SIGINT, signal.SIGTERM}
+    signal.pthread_sigmask(signal.SIG_BLOCK, stops)
+    emulator = DynamixelEmulator(chain.emulated(), options.port, mechanics, options.servo_rules_only)
+    with contextlib.ExitStack() as opened:
+        opened.enter_context(emulator)
+        faults = FaultCommands(emulator, chain.numbers, dict(zip(chain.numbers.values(), joints, strict=True)))
+        opened.enter_context(ControlSocket(control_of(options.port), faults.do))
+        sys.stdout.write(
+            f"{len(chain.servos)} servos at {chain.baud_rate} bit/s behind {options.port} ({emulator.port}); "
+            "Ctrl-C ends it\n"
+        )
+        sys.stdout.flush()
+        while signal.sigtimedwait(stops, SHOWN_S) is None:
+            emulator.check()
+    return 0
+
+
+def _fault(words: list[str]) -> int:
+    known = "\n".join(f"  {usage}" for usage, _ in VERBS.values())
+    parser = _parser("fault", f"Injects a fault into a running emulator:\n\n{known}")
+    parser.add_argument("command", nargs="+", help="one of the lines above")
+    options = parser.parse_args(words)
+    answer = request(control_of(options.port), " ".join(options.command))
+    if answer:
+        sys.stdout.write(f"{answer}\n")
+    return 0
+
+
+def _status(words: list[str]) -> int:
+    parser = _parser("status", "Prints the servos of a running emulator, and what its protocol checker has counted.")
+    parser.add_argument("--json", action="store_true", help="for programs")
+    options = parser.parse_args(words)
+    text = request(control_of(options.port), "state")
+    if options.json:
+        sys.stdout.write(f"{text}\n")
+        return 0
+    state = json.loads(text)
+    sys.stdout.write(f"{options.port} leads to {state['port']}\n")
+    sys.stdout.write(f"{'ID':>3}  {'model':12} {'position':>8} {'goal':>8}  torque  error  voltage  temperature\n")
+    for one in state["servos"]:
+        torque = "on" if one["torque_enable"] else "off"
+        sys.stdout.write(
+            f"{one['id']:3}  {one['model']:12} {one['present_position']:8} {one['goal_position']:8}  {torque:6}  "
+            f"{one['hardware_error_status']:5}  {one['voltage']:5.1f} V  {one['temperature']:8.1f} °C\n"
+        )
+    found = ", ".join(f"{count} {kind}" for kind, count in sorted(state["judge"]["findings"].items()))
+    sys.stdout.write(f"{state['judge']['packets']} packets received, {found or 'nothing wrong'}\n")
+    return 0
+
+
+def control_of(port: Path) -> Path:
+    """The control socket of an emulator, beside its port."""
+    return port.with_name(f"{port.name}.control")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,219 @@
+"""The control table of one servo: reading, checked writing, and indirect addresses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dynamixel_emulator.errors import EmulatorError, nearest
+from dynamixel_emulator.models import FIRST_INDIRECT, RAM_BEGINS, Register, ServoModel
+from dynamixel_emulator.packets import StatusError
+
+MULTI_TURN = 1_048_575
+"""Maximum goal position in the extended modes, pulses, either way (e-Manual, "Goal Position")."""
+CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, EXTENDED_MODES, PWM_MODE = 0, 1, 3, (4, 5), 16
+CURRENT_BASED_POSITION_MODE = 5
+GOALS = {
+    CURRENT_MODE: "Goal Current", VELOCITY_MODE: "Goal Velocity", POSITION_MODE: "Goal Position", 4: "Goal Position",
+    5: "Goal Position", PWM_MODE: "Goal PWM",
+}  # fmt: skip
+"""By the value of Operating Mode (11)."""
+GAINS_AND_PROFILE = (
+    "Velocity I Gain", "Velocity P Gain", "Position D Gain", "Position I Gain", "Position P Gain",
+    "Feedforward 2nd Gain", "Feedforward 1st Gain", "Profile Acceleration", "Profile Velocity",
+)  # fmt: skip
+"""Initial again with another Operating Mode, and of a backup (e-Manual, "Operating Mode", "Control Table Backup")."""
+FARTHEST_HOME = 1024
+"""In position mode a Homing Offset beyond this, either way, is ignored (e-Manual, "Homing Offset")."""
+TRIPPED = 0xFF
+"""Of Bus Watchdog (98), which reads -1."""
+
+
+class RejectedError(Exception):
+    """A request that a servo rejects, with the error number of its reply."""
+
+    def __init__(self, error: StatusError) -> None:
+        super().__init__(error.name)
+        self.error = error
+
+
+class ServoMemory:
+    """Numbers by name for the servo itself, bytes by address for the bus."""
+
+    def __init__(self, model: ServoModel) -> None:
+        self.model = model
+        self._bytes = bytearray(model.size)
+        self._values: dict[str, int] = {}  # of the bytes: the servo reads them thousands of times a second
+        self._backup: bytes | None = None
+        self._at = {one.address + i: one for one in model.registers.values() for i in range(one.size)}
+        self.reset(0)
+
+    def reset(self, first: int) -> None:
+        """Initial values from this address on, indirect addresses too."""
+        for register in self.model.registers.values():
+            if register.address >= first:
+                self[register.name] = register.initial
+        self["Firmware Version"] = self.model.firmware
+        self["Backup Ready"] = int(self._backup is not None)
+        for block in self.model.indirect:
+            for i in range(block.count):
+                at = block.addresses + 2 * i
+                self._bytes[at : at + 2] = (block.data + i).to_bytes(2, "little")
+                self._bytes[block.data + i] = 0
+
+    @property
+    def homing(self) -> int:
+        """Homing Offset as it counts in this mode, pulses."""
+        offset = self["Homing Offset"]
+        return 0 if self["Operating Mode"] == POSITION_MODE and abs(offset) > FARTHEST_HOME else offset
+
+    def retune(self) -> None:
+        """Gains and profile are initial again."""
+        for name in GAINS_AND_PROFILE:
+            self[name] = self.model.registers[name].initial
+
+    def back_up(self) -> None:
+        """Stores the table, also without power."""
+        self["Backup Ready"] = 1
+        self._backup = bytes(self._bytes)
+
+    def restore_eeprom(self) -> bool:
+        """From the backup; whether there is one."""
+        return self._restore(register for register in self.model.registers.values() if register.address < RAM_BEGINS)
+
+    def restore_ram(self) -> None:
+        """Gains, profile and indirect addresses from the backup, if there is one."""
+        if self._restore(self.model.registers[name] for name in GAINS_AND_PROFILE) and self._backup is not None:
+            for block in self.model.indirect:
+                addresses = slice(block.addresses, block.addresses + 2 * block.count)
+                self._bytes[addresses] = self._backup[addresses]
+
+    def _restore(self, registers: Iterable[Register]) -> bool:
+        if self._backup is None:
+            return False
+        for register in registers:
+            stored = self._backup[register.address : register.address + register.size]
+            self[register.name] = int.from_bytes(stored, "little")
+        return True
+
+    def register(self, name: str) -> Register:
+        """Raises EmulatorError, with the nearest name, if the model has none of this name."""
+        if name not in self.model.registers:
+            raise EmulatorError(f"{self.model.name} has no register {name!r}; {nearest(name, self.model.registers)}")
+        return self.model.registers[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.model.registers
+
+    def __getitem__(self, name: str) -> int:
+        return self._values[name]
+
+    def __setitem__(self, name: str, value: int) -> None:
+        register = self.model.registers[name]
+        data = (value % (1 << 8 * register.size)).to_bytes(register.size, "little")
+        self._bytes[register.address : register.address + register.size] = data
+        self._values[name] = int.from_bytes(data, "little", signed=register.signed)
+
+    def read(self, address: int, size: int) -> bytes:
+        """Raises RejectedError beyond the end of the table."""
+        if size == 0 or address + size > len(self._bytes):
+            raise RejectedError(StatusError.ACCESS)
+        if address + size <= FIRST_INDIRECT:
+            return bytes(self._bytes[address : address + size])
+        return bytes(self._bytes[self._meant(byte_address)] for byte_address in range(address, address + size))
+
+    def check(self, address: int, data: bytes) -> list[tuple[Register, int]]:
+        """The registers that would be written and their values. Raises RejectedError if one of them cannot be.
+
+        Bytes of the indirect access are judged by what they stand for.
+        """
+        if not data or address + len(data) > len(self._bytes):
+            raise RejectedError(StatusError.ACCESS)
+        written: dict[int, int] = {}
+        indirect: dict[int, int] = {}
+        for byte_address, byte in zip(range(address, address + len(data)), data, strict=True):
+            if self._is_indirect_address(byte_address):
+                indirect[byte_address] = byte
+            else:
+                written[self._meant(byte_address)] = byte
+        self._check_indirect(indirect)
+        return [self._checked(register, written) for register in self._touched(written)]
+
+    def write(self, address: int, data: bytes) -> set[str]:
+        """Write bytes that were checked; returns the names of their registers. Their effect is up to the servo."""
+        written: set[str] = set()
+        for byte_address, byte in zip(range(address, address + len(data)), data, strict=True):
+            target = byte_address if self._is_indirect_address(byte_address) else self._meant(byte_address)
+            self._bytes[target] = byte
+            if target in self._at:
+                written.add(self._at[target].name)
+        for name in written:
+            register = self.model.registers[name]
+            stored = self._bytes[register.address : register.address + register.size]
+            self._values[name] = int.from_bytes(stored, "little", signed=register.signed)
+        return written
+
+    def _check_indirect(self, written: dict[int, int]) -> None:
+        """Indirect addresses are of two bytes, and lead to RAM. Raises RejectedError if these cannot be written."""
+        if written and self["Torque Enable"]:
+            raise RejectedError(StatusError.ACCESS)
+        for byte_address, byte in written.items():
+            if byte_address ^ 1 not in written:
+                raise RejectedError(StatusError.DATA_LENGTH)
+            if byte_address % 2 == 0 and not RAM_BEGINS <= byte + 256 * written[byte_address + 1] < len(self._bytes):
+                raise RejectedError(StatusError.DATA_RANGE)
+
+    def _touched(self, written: dict[int, int]) -> list[Register]:
+        touched: dict[str, Register] = {}
+        for byte_address in written:
+            if byte_address >= FIRST_INDIRECT and byte_address not in self._at:
+                continue  # data of the indirect access that stand for nothing else
+            register = self._at.get(byte_address)
+            if register is None or not register.writable:
+                raise RejectedError(StatusError.ACCESS)
+            if register.address < RAM_BEGINS and self["Torque Enable"]:
+                raise RejectedError(StatusError.ACCESS)
+            touched[register.name] = register
+        return list(touched.values())
+
+    def _checked(self, register: Register, written: dict[int, int]) -> tuple[Register, int]:
+        addresses = range(register.address, register.address + register.size)
+        if any(byte_address not in written for byte_address in addresses):
+            raise RejectedError(StatusError.DATA_LENGTH)
+        value = int.from_bytes(
+            bytes(written[byte_address] for byte_address in addresses), "little", signed=register.signed
+        )
+        assert register.allowed is not None
+        low, high = register.allowed
+        if (low is not None and value < low) or (high is not None and value > high):
+            raise RejectedError(StatusError.DATA_RANGE)
+        if register.name == "Operating Mode" and value not in self.model.modes:
+            raise RejectedError(StatusError.DATA_RANGE)
+        if register.name == "Bus Watchdog":
+            return register, value
+        if register.name.startswith("Goal") and self["Bus Watchdog"] == TRIPPED:  # tripped: goals are read only
+            raise RejectedError(StatusError.DATA_RANGE)
+        low, high = self._limits(register.name)
+        if (low is not None and value < low) or (high is not None and value > high):
+            raise RejectedError(StatusError.DATA_LIMIT)
+        return register, value
+
+    def _limits(self, name: str) -> tuple[int | None, int | None]:
+        """Of goals, by other registers."""
+        if name == "Goal Position":
+            if self["Operating Mode"] in EXTENDED_MODES:
+                return -MULTI_TURN, MULTI_TURN
+            return self["Min Position Limit"], self["Max Position Limit"]
+        limit = {"Goal PWM": "PWM Limit", "Goal Current": "Current Limit", "Goal Velocity": "Velocity Limit"}.get(name)
+        return (None, None) if limit is None else (-self[limit], self[limit])
+
+    def _is_indirect_address(self, byte_address: int) -> bool:
+        return any(one.addresses <= byte_address < one.addresses + 2 * one.count for one in self.model.indirect)
+
+    def _meant(self, byte_address: int) -> int:
+        """The address that a byte of indirect data is mapped to; any other is its own."""
+        for block in self.model.indirect:
+            if block.data <= byte_address < block.data + block.count:
+                at = block.addresses + 2 * (byte_address - block.data)
+                meant = int.from_bytes(self._bytes[at : at + 2], "little")
+                return meant if RAM_BEGINS <= meant < len(self._bytes) else byte_address
+        return byte_address
