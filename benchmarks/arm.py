@@ -36,7 +36,6 @@ import numpy as np
 import serial
 
 from dynamixel_emulator import DynamixelEmulator
-from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
 from paramove.robots import RobotDescription
@@ -50,6 +49,7 @@ from paramove.robots.dynamixel import (
     joint_servos,
     servo_port,
 )
+from paramove.robots.streaming import Playing
 from paramove.safety import State
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # run as a program, only this folder is known
@@ -144,7 +144,7 @@ class Rig:
     def ramp_begins_ms(self, begun_s: float) -> float:
         """From then until a row of the stop ramp is the latest one played."""
         reader = self.loop._reader
-        wait(lambda: reader.playing != Hoap3State.PLAYING_FRAMES)
+        wait(lambda: reader.playing != Playing.FRAMES)
         index = reader.next_index
         wait(lambda: reader.next_index > index)
         return 1e3 * (time.monotonic() - begun_s)

@@ -32,6 +32,7 @@ from paramove.dashboard import link_in  # noqa: E402
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory  # noqa: E402
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState  # noqa: E402
 from paramove.robots import RobotDescription  # noqa: E402
+from paramove.robots.hoap3 import receive, state_message  # noqa: E402
 from paramove.robots.streaming import StreamReader  # noqa: E402
 from paramove.safety import minimum_jerk  # noqa: E402
 
@@ -62,12 +63,13 @@ class World:
                     for _ in range(round(1e3 * (now_s - played_s))):
                         self.reader.play()
                     played_s = now_s
-                    self.bus.publish(topics.WIRE_HOAP3_STATE, self.reader.state(self.reader.target, event.now_ns))
+                    state = self.reader.state(self.reader.target, event.now_ns)
+                    self.bus.publish(topics.WIRE_HOAP3_STATE, state_message(state))
                     if self.moving_s and not self.pressed_s and now_s - self.moving_s > self.press_at_s:
                         self.pressed_s = float("inf")
                         threading.Thread(target=self._press, daemon=True).start()
                 elif event.topic is topics.WIRE_HOAP3_STREAM:
-                    self.reader.offer(event.message)
+                    receive(event.message, self.reader)
                     if self.stopping_s and not self.batch_s:
                         self.batch_s = now_s
                 elif event.message.state == SafetyState.STATE_DISARMED:

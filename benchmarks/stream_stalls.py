@@ -21,9 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from paramove.documents import Floats
-from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 from paramove.robots import RobotDescription
-from paramove.robots.streaming import StreamReader, StreamWriter
+from paramove.robots.streaming import StreamBatch, StreamReader, StreamWriter
 from paramove.safety import longest_path_s, stop_ramp
 
 EPOCH = 3

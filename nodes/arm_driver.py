@@ -17,6 +17,7 @@ from typing import Any
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.robots import RobotDescription, ThisLaunch
+from paramove.robots.hoap3 import batch_message, state_of
 from paramove.robots.streaming import ArmDriver
 
 SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.WIRE_HOAP3_STATE)
@@ -34,7 +35,7 @@ def run(bus: Bus, config: Config) -> None:
     launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
     driver = ArmDriver(RobotDescription.load(config.robot), no_program=lambda: launch.why_no_program(bus.settings))
     handle: dict[topics.Topic, Any] = {topics.ARM_TRAJECTORY: driver.on_trajectory}
-    handle |= {topics.WIRE_HOAP3_STATE: driver.on_robot_state}
+    handle |= {topics.WIRE_HOAP3_STATE: lambda message, at_ns: driver.on_robot_state(state_of(message), at_ns)}
     handle |= dict.fromkeys(topics.ARMINGS, driver.on_arm_request) | dict.fromkeys(topics.STOPS, driver.on_stop)
     bus.ready(driver.detail)
     for event in bus.events(*SUBSCRIBES, tick=True):
@@ -44,7 +45,7 @@ def run(bus: Bus, config: Config) -> None:
                 continue  # a stop does not wait for the next period
         output = driver.tick(bus.now_ns)
         if output.stream is not None:
-            bus.publish(topics.WIRE_HOAP3_STREAM, output.stream)
+            bus.publish(topics.WIRE_HOAP3_STREAM, batch_message(output.stream))
         if output.joint_states is not None:
             bus.publish(topics.ARM_JOINT_STATES, output.joint_states, output.joint_states.timestamp.ToNanoseconds())
         for status in output.statuses:

@@ -14,7 +14,7 @@ from paramove.bus import Received, topics
 from paramove.documents import Floats, Image
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.robots import RobotDescription
-from paramove.robots.hoap3 import Firmware
+from paramove.robots.hoap3 import Firmware, receive, state_message
 from paramove.robots.streaming import StreamReader
 from sim import looks, scene
 from sim.camera import Eye, Sensor
@@ -99,7 +99,7 @@ class Simulation:
     def handle(self, received: Received) -> None:
         """Handle a message of the stream or of the robot's speech."""
         if received.topic is topics.WIRE_HOAP3_STREAM:
-            self.stream.offer(received.message)
+            receive(received.message, self.stream)
         elif received.topic is topics.SPEECH:
             self.instructor.handle(received.message.request, received.message.object)
 
@@ -145,7 +145,7 @@ class Simulation:
         """What the robot reports: its stream and its measured joints."""
         units = self.description.units
         counts = (units.zero_counts + units.counts_per_rad * self.world.joint_positions()).round().astype("int16")
-        return self.stream.state(counts, self.now_ns)
+        return state_message(self.stream.state(counts, self.now_ns))
 
     def close(self) -> None:
         """Gives the graphics contexts back."""

@@ -10,6 +10,7 @@ from paramove.bus.subscriber import Received
 from paramove.bus.ticks import Tick
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
+from paramove.robots.hoap3.wire import state_message
 from tests.motion.reaching import ROBOT_FOLDER
 from tests.robots.hoap3.movements import HOAP3
 from tests.robots.streaming.fake_robot import TICK_NS, FakeRobot, trajectory
@@ -25,7 +26,7 @@ def replayed(ticks: int, more: dict[int, list], until_state: int | None = None) 
         now_ns = number * TICK_NS
         heard = list(more.get(number, []))
         if until_state is None or number < until_state:
-            heard.insert(0, (topics.WIRE_HOAP3_STATE, robot.state(now_ns)))
+            heard.insert(0, (topics.WIRE_HOAP3_STATE, state_message(robot.state(now_ns))))
         events += [Received(topic, message, now_ns, now_ns, number) for topic, message in heard]
         events.append(Tick(number, now_ns))
     bus = RecordedBus(events)

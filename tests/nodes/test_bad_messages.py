@@ -40,6 +40,7 @@ from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
 from paramove.objects.homography import PlaneHomography
+from paramove.robots.hoap3.wire import state_message
 from tests.action_space import drawn_arm
 from tests.applications.pointing_story import PointingStory
 from tests.applications.servo_cell import ServoCell
@@ -216,7 +217,8 @@ def of_arm_driver() -> list[Event]:
     }
     for number in range(1, 60):
         now_ns = number * PERIOD_NS
-        heard = [(topics.WIRE_HOAP3_STATE, robot.state(now_ns))] + ([more[number]] if number in more else [])
+        heard = [(topics.WIRE_HOAP3_STATE, state_message(robot.state(now_ns)))]
+        heard += [more[number]] if number in more else []
         events += [Received(topic, message, now_ns, now_ns, number) for topic, message in heard]
         events.append(Tick(number, now_ns))
     return events

@@ -67,7 +67,7 @@ class _Running:
     message: JointTrajectory | None = None
     acknowledged: bool = False
     sent_ns: int = 0
-    received_ns: int = 0
+    received_ns: int | None = None  # of a status, or of the first tick after the motion was planned: that may take long
     time_s: float = 0.0
     phase: str = ""
     motions: int = 0
@@ -171,19 +171,22 @@ class Synthesizer:
             waiting, self._waiting = self._waiting, None
             self._begin_or_reject(waiting)
         running = self._running
-        if running is not None and now_ns - running.received_ns > STATUS_TIMEOUT_NS:
-            self._stopped(
-                running, f"no status of the motion from the arm's driver for {1e-9 * STATUS_TIMEOUT_NS:.0f} s"
-            )
-            running = None
-        unanswered = running is not None and not running.acknowledged and now_ns - running.sent_ns >= RESEND_NS
-        if running is not None and running.message is not None and unanswered:
-            running.message.captured.FromNanoseconds(now_ns)
-            self._trajectories.append(running.message)
-            running.sent_ns = now_ns
+        if running is not None:
+            self._await_status(running)
         output = SynthesizerOutput(tuple(self._trajectories), tuple(self._statuses))
         self._trajectories, self._statuses = [], []
         return output
+
+    def _await_status(self, running: _Running) -> None:
+        """Send the motion again until the driver acknowledges it, and give up a driver that reports nothing."""
+        running.received_ns = self._now_ns if running.received_ns is None else running.received_ns
+        if self._now_ns - running.received_ns > STATUS_TIMEOUT_NS:
+            timeout_s = round(1e-9 * STATUS_TIMEOUT_NS)
+            self._stopped(running, f"no status of the motion from the arm's driver for {timeout_s} s")
+        elif running.message is not None and not running.acknowledged and self._now_ns - running.sent_ns >= RESEND_NS:
+            running.message.captured.FromNanoseconds(self._now_ns)
+            self._trajectories.append(running.message)
+            running.sent_ns = self._now_ns
 
     def _reject_for_another_arm(self) -> None:
         """A goal that waits for the arm's pose will never get it from the joints of another arm."""
@@ -302,7 +305,7 @@ class Synthesizer:
         running.elbow_turn = max(running.elbow_turn, step.elbow_turn)
         name = f"{running.goal.id}/{running.motions}"
         running.message = motion_message(name, self._arm.joints, step, self._now_ns)
-        running.sent_ns = running.received_ns = self._now_ns
+        running.sent_ns, running.received_ns = self._now_ns, None
         self._trajectories.append(running.message)
 
     def _stopped(self, running: _Running, reason: str) -> None:

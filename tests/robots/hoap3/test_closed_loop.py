@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.robots.hoap3.firmware import Firmware
 from paramove.robots.streaming.driver import DriverOutput
+from paramove.robots.streaming.stream import StreamBatch, StreamState
 from tests.robots.hoap3.movements import HOAP3
 from tests.robots.hoap3.test_firmware import MODEL, QPOS, QVEL
 from tests.robots.streaming.fake_robot import FakeRobot, Rig
@@ -36,7 +36,7 @@ class PhysicalRobot(FakeRobot):
             mujoco.mj_step(MODEL, self.data)
             self.fastest = np.maximum(self.fastest, np.abs(self.data.qvel[QVEL]))
 
-    def state(self, now_ns: int) -> Hoap3State:
+    def state(self, now_ns: int) -> StreamState:
         units = HOAP3.units
         measured = np.rint(units.zero_counts + units.counts_per_rad * self.data.qpos[QPOS]).astype(np.int16)
         return self.reader.state(measured, now_ns)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest
 from paramove.robots.streaming.driver import ArmDriver, DriverOutput
-from paramove.robots.streaming.stream import StreamReader
+from paramove.robots.streaming.stream import StreamBatch, StreamReader, StreamState
 from paramove.safety.gate_io import State
 from tests.robots.hoap3.movements import HOAP3
 
@@ -26,7 +25,7 @@ class FakeRobot:
     def play(self, milliseconds: int = 67) -> None:
         self.played += [self.reader.play() for _ in range(milliseconds)]
 
-    def state(self, now_ns: int) -> Hoap3State:
+    def state(self, now_ns: int) -> StreamState:
         counts = self.reader.target.copy()
         for joint, count in self.held_joints.items():
             counts[joint] = count

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
+from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
+from paramove.robots.hoap3.wire import state_of
 from paramove.robots.streaming.driver import ArmDriver
 from paramove.safety.gate_io import State
 from tests.robots.hoap3.movements import HOAP3
@@ -202,11 +203,9 @@ def test_empty_and_impossible_trajectories_are_refused_and_never_read_as_zero(
     np.testing.assert_array_equal(rig.robot.reader.target, HOAP3.units.to_counts(HOAP3.base_pose))
 
 
-def test_empty_words_and_batches_move_nothing() -> None:
+def test_empty_words_and_states_move_nothing() -> None:
     rig = armed()
-    assert not rig.robot.reader.offer(StreamBatch())
-    assert "epoch 0" in rig.robot.reader.rejection
-    rig.driver.on_robot_state(Hoap3State(), rig.now_ns)
+    rig.driver.on_robot_state(state_of(Hoap3State()), rig.now_ns)
     assert rig.driver.state is State.ARMED
     rig.driver.on_arm_request(ArmRequest(), rig.now_ns + 1)
     rig.tick()
@@ -216,7 +215,7 @@ def test_empty_words_and_batches_move_nothing() -> None:
 def test_a_robot_that_says_nothing_of_its_joints_is_not_taken_to_be_at_zero() -> None:
     rig = Rig()
     driver = ArmDriver(HOAP3)
-    driver.on_robot_state(Hoap3State(), rig.now_ns)
+    driver.on_robot_state(state_of(Hoap3State()), rig.now_ns)
     output = driver.tick(rig.now_ns)
     assert output.joint_states is None
     assert output.safety.state == SafetyState.STATE_DISCONNECTED

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.robots.streaming.driver import DriverOutput
+from paramove.robots.streaming.stream import StreamBatch
 from paramove.safety.gate_io import State
 from tests.robots.hoap3.movements import HOAP3
 from tests.robots.streaming.fake_robot import TICK_NS, Rig

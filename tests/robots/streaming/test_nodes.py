@@ -18,6 +18,7 @@ from paramove.bus.topics import Topic
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.operator.arming_at_start import Operator
+from paramove.robots.hoap3.wire import receive, state_message
 from tests.robots.streaming.fake_robot import TICK_NS, FakeRobot, trajectory
 
 WORKSPACE = Path(__file__).parents[3]
@@ -48,7 +49,7 @@ class RobotBus:
         assert isinstance(message, topic.type)
         self.published.append((topic, message))
         if topic is topics.WIRE_HOAP3_STREAM:
-            assert self.robot.reader.offer(message), self.robot.reader.rejection
+            assert receive(message, self.robot.reader), self.robot.reader.rejection
         if topic is topics.ARM_SAFETY and (word := self.operator.update(message, self.now_ns)):
             word.by_person = self.by_person
             self.pending.append((topics.OPERATOR_ARM_AT_START, word))
@@ -60,7 +61,7 @@ class RobotBus:
             self.now_ns = number * TICK_NS
             if number == 10:
                 self.pending.append((topics.ARM_TRAJECTORY, trajectory("one", {"right_elbow": -60.0}, 1.0)))
-            self.pending.append((topics.WIRE_HOAP3_STATE, self.robot.state(self.now_ns)))
+            self.pending.append((topics.WIRE_HOAP3_STATE, state_message(self.robot.state(self.now_ns))))
             heard, self.pending = self.pending, []
             for topic, message in heard:
                 yield Received(topic, message, self.now_ns, self.now_ns, number)

@@ -15,13 +15,12 @@ import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.documents import Floats
-from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
 from paramove.robots import RobotDescription
 from paramove.robots.streaming.execution import Execution
 from paramove.robots.streaming.robot_report import RobotReport
-from paramove.robots.streaming.stream import StreamWriter
+from paramove.robots.streaming.stream import StreamBatch, StreamState, StreamWriter
 from paramove.safety import (
     PERSON_STOP,
     TOUCHED,
@@ -60,7 +59,7 @@ TICKS_PER_PROGRESS = 5
 
 @dataclass(frozen=True)
 class DriverOutput:
-    """The messages of a tick; `stream` and `joint_states` are None where there is nothing new."""
+    """The output of a tick; `stream` and `joint_states` are None where there is nothing new."""
 
     stream: StreamBatch | None
     joint_states: JointStates | None
@@ -137,9 +136,9 @@ class ArmDriver:
             return "disarmed, waiting for the robot"
         return f"safety gate: {self._core.state.value}"
 
-    def on_robot_state(self, message: Hoap3State, captured_ns: int) -> None:
+    def on_robot_state(self, state: StreamState, captured_ns: int) -> None:
         """Take the robot's report on its stream and joints; one that cannot be read counts as none."""
-        report = RobotReport.of(message, captured_ns, self._description, self._report)
+        report = RobotReport.of(state, captured_ns, self._description, self._report)
         if report is not None:
             before, execution = self._report, self._execution
             # A first batch is sent until it is known to be played; those rejected meanwhile were not late.

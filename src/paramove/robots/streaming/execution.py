@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramove.documents import Floats
-from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.robots import RobotDescription
 from paramove.robots.streaming.robot_report import RobotReport
+from paramove.robots.streaming.stream import Playing
 from paramove.safety import Fault
 
 START_TIMEOUT_S = 0.5
@@ -66,7 +66,7 @@ class Execution:
                 return None
             why = f"; the robot reports: {report.rejection}" if report.rejection else ""
             return Fault("stream_not_begun", "", f"nothing was played within {START_TIMEOUT_S:g} s{why}")
-        ran_out = report.at_rest or report.playing == Hoap3State.PLAYING_STOP_RAMP
+        ran_out = report.at_rest or report.playing == Playing.STOP_RAMP
         if not ran_out or report.next_index >= self.end_index:
             return None
         progress = f"{report.next_index - self.start_index} of {len(self.rows) - 1} rows"

@@ -9,8 +9,8 @@ from foxglove_schemas_protobuf.JointState_pb2 import JointState
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.documents import Floats
-from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.robots import JointRangeError, RobotDescription
+from paramove.robots.streaming.stream import Playing, StreamState
 from paramove.safety import Measured
 
 
@@ -21,7 +21,7 @@ class RobotReport:
     captured_ns: int
     epoch: int
     next_index: int
-    playing: Hoap3State.Playing
+    playing: Playing
     rejected_batches: int
     rejection: str
     positions: Floats
@@ -31,14 +31,14 @@ class RobotReport:
 
     @classmethod
     def of(
-        cls, message: Hoap3State, captured_ns: int, description: RobotDescription, before: RobotReport | None
+        cls, state: StreamState, captured_ns: int, description: RobotDescription, before: RobotReport | None
     ) -> RobotReport | None:
-        """Read a message; None if its counts are not those of this robot: they are not replaced by invented ones."""
+        """In radians; None if the counts are not those of this robot: they are not replaced by invented ones."""
         units = description.units
         try:
-            positions = units.to_radians(list(message.counts))
+            positions = units.to_radians(state.counts)
             # A robot that does not report its targets is taken to hold its position.
-            commanded = units.to_radians(list(message.target_counts)) if message.target_counts else positions
+            commanded = units.to_radians(state.target_counts) if len(state.target_counts) else positions
         except JointRangeError:
             return None
         velocities = np.zeros(description.n_joints)
@@ -46,11 +46,11 @@ class RobotReport:
             velocities = (positions - before.positions) / ((captured_ns - before.captured_ns) * 1e-9)
         return cls(
             captured_ns,
-            message.epoch,
-            message.next_index,
-            message.playing,
-            message.rejected_batches,
-            message.rejection,
+            state.epoch,
+            state.next_index,
+            state.playing,
+            state.rejected_batches,
+            state.rejection,
             positions,
             commanded,
             velocities,
@@ -60,7 +60,7 @@ class RobotReport:
     @property
     def at_rest(self) -> bool:
         """Whether the robot plays nothing."""
-        return self.playing in (Hoap3State.PLAYING_NOTHING, Hoap3State.PLAYING_HELD)
+        return self.playing in (Playing.NOTHING, Playing.HELD)
 
     def measured(self, epoch: int) -> Measured:
         """As input of the safety gate; of another epoch no row counts as played."""

@@ -1,19 +1,20 @@
-"""The stream to a robot, at 1 kHz to HOAP-3: batches of target frames, each of which ends in its own stop ramp.
+"""The stream to a robot: batches of target frames, each of which ends in its own stop ramp.
 
 The next batch replaces the ramp from an index that is not yet played. So nothing has to be decided when batches stop
-coming: the robot plays the ramp that it already has. `StreamReader` is the robot's side (the simulator uses it); it
-plays one frame a millisecond and rejects, as a whole, every batch that it could not play smoothly.
+coming: the robot plays the ramp that it already has. `StreamReader` is the robot's side; it plays one frame a period
+and rejects, as a whole, every batch that it could not play smoothly. HOAP-3's wire carries both sides' messages
+(`robots/hoap3/wire.py`); a servo arm has both in one process.
 """
 
 from __future__ import annotations
 
-import zlib
+from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents import Floats
-from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
+from paramove.documents import Floats, Ints
 from paramove.robots import RobotDescription
 
 Frames = NDArray[np.int16]
@@ -24,7 +25,62 @@ MAX_FRAMES = 5000
 SPAN_S = 0.004
 BEYOND = float(np.deg2rad(2.0))
 """A joint that rests so far beyond its range, against its stop, may be held there; the gate judges how far it may."""
-_FRAME_TYPE = np.dtype("<i2")
+
+
+class Playing(IntEnum):
+    """What a robot plays; the numbers are those of HOAP-3's wire."""
+
+    UNSPECIFIED = 0
+    NOTHING = 1
+    FRAMES = 2
+    STOP_RAMP = 3
+    HELD = 4
+
+
+@dataclass(frozen=True, eq=False)
+class StreamBatch:
+    """Frames to play.
+
+    Attributes:
+        epoch: Of the sender; new at each of its starts, not 0.
+        first_index: Of the first frame; frames count from 0 since the epoch began.
+        period_us: Of a frame.
+        frames: [N, J], joint units of the robot.
+        stop_ramp_frames: How many of the last frames are the stop ramp.
+    """
+
+    epoch: int
+    first_index: int
+    period_us: int
+    frames: Frames
+    stop_ramp_frames: int
+
+
+@dataclass(frozen=True, eq=False)
+class StreamState:
+    """What a robot reports of its stream and joints.
+
+    Attributes:
+        captured_ns: Time of the measurement.
+        epoch: Of the stream being played; 0 before any.
+        next_index: Of the frame to be played next.
+        depth: Frames still to be played, the stop ramp included.
+        playing: What the next frame is part of.
+        counts: Measured joints, [J], joint units.
+        target_counts: The frame that is played or held, [J]; empty from a robot that does not report it.
+        rejected_batches: How many batches were rejected.
+        rejection: Why the latest of them was.
+    """
+
+    captured_ns: int
+    epoch: int
+    next_index: int
+    depth: int
+    playing: Playing
+    counts: Ints
+    target_counts: Ints
+    rejected_batches: int
+    rejection: str
 
 
 class StreamWriter:
@@ -48,17 +104,7 @@ class StreamWriter:
         Raises:
             JointRangeError: A value that the robot's integer units cannot hold.
         """
-        frames = self._units.to_counts(rows, BEYOND)
-        content = frames.astype(_FRAME_TYPE).tobytes()
-        return StreamBatch(
-            epoch=self.epoch,
-            first_index=first_index,
-            period_us=self._period_us,
-            joint_count=frames.shape[1],
-            stop_ramp_frames=ramp_rows,
-            frames=content,
-            crc=zlib.crc32(content),
-        )
+        return StreamBatch(self.epoch, first_index, self._period_us, self._units.to_counts(rows, BEYOND), ramp_rows)
 
 
 class StreamReader:
@@ -106,13 +152,13 @@ class StreamReader:
         return not len(self._coming)
 
     @property
-    def playing(self) -> Hoap3State.Playing:
+    def playing(self) -> Playing:
         """What the next frame is part of."""
         if not self.epoch:
-            return Hoap3State.PLAYING_NOTHING
+            return Playing.NOTHING
         if self.at_rest:
-            return Hoap3State.PLAYING_HELD
-        return Hoap3State.PLAYING_STOP_RAMP if self.depth <= self._ramp_frames else Hoap3State.PLAYING_FRAMES
+            return Playing.HELD
+        return Playing.STOP_RAMP if self.depth <= self._ramp_frames else Playing.FRAMES
 
     @property
     def target(self) -> Frames:
@@ -133,13 +179,11 @@ class StreamReader:
 
     def offer(self, batch: StreamBatch) -> bool:
         """Take a batch, or reject it as a whole and keep the buffer. Returns whether it was taken."""
-        reason = self._error_of_form(batch)
-        if not reason:
-            frames = np.frombuffer(batch.frames, dtype=_FRAME_TYPE).reshape(-1, batch.joint_count).astype(np.int16)
-            reason = self._error_of_index(batch, len(frames)) or self._error_of_frames(batch, frames)
+        frames = batch.frames
+        reason = self._error_of_form(batch) or self._error_of_index(batch, len(frames))
+        reason = reason or self._error_of_frames(batch, frames)
         if reason:
-            self.rejected_batches += 1
-            self.rejection = reason
+            self.reject(reason)
             return False
         if batch.epoch != self.epoch:
             self.epoch = batch.epoch
@@ -149,20 +193,24 @@ class StreamReader:
         self._ramp_frames = batch.stop_ramp_frames
         return True
 
-    def state(self, measured_counts: Frames, captured_ns: int) -> Hoap3State:
+    def reject(self, reason: str) -> None:
+        """Count a batch that is not taken."""
+        self.rejected_batches += 1
+        self.rejection = reason
+
+    def state(self, measured_counts: Frames | Ints, captured_ns: int) -> StreamState:
         """What the robot reports: its stream and its measured joints, [J] counts."""
-        state = Hoap3State(
-            epoch=self.epoch,
-            next_index=self.next_index,
-            depth=self.depth,
-            playing=self.playing,
-            counts=[int(count) for count in measured_counts],
-            target_counts=[int(count) for count in self.target],
-            rejected_batches=self.rejected_batches,
-            rejection=self.rejection,
+        return StreamState(
+            captured_ns,
+            self.epoch,
+            self.next_index,
+            self.depth,
+            self.playing,
+            np.asarray(measured_counts, dtype=np.int64),
+            self.target.astype(np.int64),
+            self.rejected_batches,
+            self.rejection,
         )
-        state.captured.FromNanoseconds(captured_ns)
-        return state
 
     def _error_of_form(self, batch: StreamBatch) -> str:
         n_joints = len(self._units.names)
@@ -170,15 +218,14 @@ class StreamReader:
             return "epoch 0, a sender's epoch is 1 or more"
         if batch.period_us != self._period_us:
             return f"period {batch.period_us} us, allowed {self._period_us} us"
-        if batch.joint_count != n_joints:
-            return f"{batch.joint_count} joints, allowed {n_joints}"
-        n_frames, rest = divmod(len(batch.frames), _FRAME_TYPE.itemsize * n_joints)
-        if rest or not 1 <= n_frames <= MAX_FRAMES:
-            return f"{len(batch.frames)} bytes, allowed 1 to {MAX_FRAMES} frames of {n_joints} 16 bit numbers"
+        if batch.frames.ndim != 2 or batch.frames.shape[1] != n_joints:
+            return f"{batch.frames.shape[-1]} joints, allowed {n_joints}"
+        n_frames = len(batch.frames)
+        if not 1 <= n_frames <= MAX_FRAMES:
+            return f"{n_frames} frames, allowed 1 to {MAX_FRAMES}"
         if batch.stop_ramp_frames > n_frames:
             return f"a stop ramp of {batch.stop_ramp_frames} frames, the batch has {n_frames}"
-        crc = zlib.crc32(batch.frames)
-        return "" if crc == batch.crc else f"CRC {crc:08x}, the batch has {batch.crc:08x}"
+        return ""
 
     def _error_of_index(self, batch: StreamBatch, n_frames: int) -> str:
         if batch.epoch != self.epoch:
