@@ -52,7 +52,7 @@ def api_page() -> str:
         for public in public_names(package):
             thing = getattr(package, public)
             link = f"`{public}`"
-            ours = getattr(thing, "__module__", "").startswith("paramove")
+            ours = getattr(thing, "__module__", "").split(".")[0] in ("dynamixel_emulator", "paramove")
             if ours:
                 file = Path(inspect.getfile(importlib.import_module(thing.__module__))).relative_to(ROOT)
                 link = f"[{link}](../../{file})"

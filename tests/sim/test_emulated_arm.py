@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PacketHandler
 
-from dynamixel_emulator.control import tell
+from dynamixel_emulator.control import request
 from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from sim.emulated_arm import EmulatedArm
@@ -52,10 +52,10 @@ def test_servos_hold_the_arm_and_lift_it(robot):
 
 def test_joints_have_their_names_at_the_control_socket(tmp_path):
     with EmulatedArm(KOCH, control=tmp_path / "control") as arm:
-        tell(tmp_path / "control", "block elbow_flex")
+        request(tmp_path / "control", "block elbow_flex")
         assert [servo.blocked for servo in arm.emulator.bus.servos] == [False, False, True, False, False, False]
         assert "koch_v1_1 at /dev/" in arm.detail
-        tell(tmp_path / "control", "unplug")
+        request(tmp_path / "control", "unplug")
         assert "unplugged" in arm.detail
 
 

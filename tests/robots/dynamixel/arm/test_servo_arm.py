@@ -31,7 +31,8 @@ WITHIN_A_TURN = JointCalibration(
 @pytest.fixture
 def emulator():
     servos = [
-        EmulatedServo(joint.model, joint.number, BAUD_RATE, place) for joint, place in zip(JOINTS, PLACES, strict=True)
+        EmulatedServo(joint.model.name, joint.number, BAUD_RATE, place)
+        for joint, place in zip(JOINTS, PLACES, strict=True)
     ]
     with DynamixelEmulator(servos) as emulator:
         yield emulator
