@@ -46,7 +46,7 @@ LEFT_OUT = ("status/", "clock")
 LAST_MESSAGES = 50
 RENAMED: dict[str, str] = {"camera/light": "camera/image_raw"}
 """Topics: name before the change -> name after it."""
-TIMES = re.compile(r"(?<![a-z])(seconds?|minutes?|times?|ms|took|date|commit|versions?)(?![a-z])")
+TIMES = re.compile(r"(?<![a-z])(seconds?|minutes?|times?|ms|took|date|commit|versions?|fit|classify)(?![a-z])|, s$")
 """Words in the names of numbers that differ from run to run."""
 
 
