@@ -10,7 +10,7 @@ which on a busy machine is too little, so each has three tries. The exit code is
 from __future__ import annotations
 
 import argparse
-import signal
+import json
 import subprocess
 import sys
 import venv
@@ -45,6 +45,7 @@ CLIENTS = {
     "dynamixel-python 0.0.8": "with_dxl2.py",
     "dynio 0.9.2": "with_dynio.py",
 }
+SERVOS = ("xl430_w250:1", "xl330_m288:2", "xl330_m288:3")
 TIMEOUT_S = 60.0
 TRIES = 3
 
@@ -83,7 +84,10 @@ def install(console: Console) -> None:
 
 def tried(script: str, link: Path) -> tuple[bool, str, str]:
     """Whether a client is satisfied with fresh servos, its last line, and what the servos reject."""
-    servos = subprocess.Popen([sys.executable, HERE / "servos.py", link], stdout=subprocess.PIPE, text=True)
+    emulator = [sys.executable, "-m", "dynamixel_emulator"]
+    port = ["--port", str(link)]
+    rejected = ""
+    servos = subprocess.Popen([*emulator, *SERVOS, *port, "--servo-rules-only"], stdout=subprocess.PIPE, text=True)
     try:
         assert servos.stdout is not None
         servos.stdout.readline()
@@ -92,11 +96,15 @@ def tried(script: str, link: Path) -> tuple[bool, str, str]:
         )
     except subprocess.TimeoutExpired:
         return False, f"was not ready after {TIMEOUT_S:g} s", ""
+    else:
+        status = subprocess.run([*emulator, "status", *port, "--json"], capture_output=True, text=True, check=True)
+        findings = json.loads(status.stdout)["judge"]["findings"]
+        rejected = ", ".join(f"{count} {kind}" for kind, count in sorted(findings.items()))
     finally:
-        servos.send_signal(signal.SIGTERM)
-        rejected, _ = servos.communicate()
+        servos.terminate()
+        servos.communicate()
     output = ran.stdout if ran.returncode == 0 else ran.stderr
-    return ran.returncode == 0, (output.strip() or "nothing").splitlines()[-1], rejected.strip()
+    return ran.returncode == 0, (output.strip() or "nothing").splitlines()[-1], rejected
 
 
 if __name__ == "__main__":
