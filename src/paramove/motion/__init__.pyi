@@ -6,6 +6,7 @@ from .hand_poses import FARTHEST_M as FARTHEST_M
 from .hand_poses import metres as metres
 from .planned_motion import PlannedMotion as PlannedMotion
 from .planned_motion import RelocationOptions as RelocationOptions
+from .planned_motion import RestPose as RestPose
 from .planned_motion import motion_message as motion_message
 from .plans import MotionPlans as MotionPlans
 from .plans import NoPlanError as NoPlanError
