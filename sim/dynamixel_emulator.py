@@ -1,4 +1,4 @@
-"""Dynamixel emulator: stands where the servos of an arm stand, behind a serial port, in a world that they move.
+"""Dynamixel emulator: replaces the servos of an arm, behind a serial port, in a simulated world that they move.
 
 Publishes   truth/state   TruthState   15 Hz   world; only for evaluators
 """
@@ -18,11 +18,12 @@ REPORT_TICKS = 75
 
 
 class Config(NodeConfig):
-    """`port`: a link to the port, `control`: a socket for faults, '' for none; both in the run folder or absolute.
+    """`port`: path of the link to the port; `control`: path of the control socket for faults, '' for none. Both are
+    absolute or relative to the run folder.
 
-    `scene`: a file by the robot's model; `posture_deg`: angles of joints at the start, others are in the base pose;
-    `held`: whether the servos hold from the start; `servo_rules_only`: whether only what servos themselves reject is
-    counted, not goals that jump.
+    `scene`: a file next to the robot's model; `posture_deg`: initial joint angles, others are in the base pose;
+    `held`: whether torque is on from the start; `servo_rules_only`: whether to report only packets that the servos
+    themselves reject, not goals that jump.
     """
 
     robot: Path = Path("robot_description/koch_v1_1")
@@ -36,7 +37,7 @@ class Config(NodeConfig):
 
 
 def run(bus: Bus, config: Config) -> None:
-    """Loop until the bus closes; then the port is gone. Servos run in real time, whatever the clock of the others."""
+    """Loop until the bus closes, then remove the port. Servos run in real time, independent of the bus clock."""
     robot = RobotDescription.load(config.robot)
     control = bus.run_folder / config.control if config.control else None
     link = bus.run_folder / config.port

@@ -1,4 +1,4 @@
-"""A servo arm of `robot_description/` in its scene, behind an emulated port: all that a driver of the arm needs."""
+"""A servo arm of `robot_description/` in its scene, behind an emulated serial port for the arm's driver."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ from paramove.robots import RobotDescription
 
 
 class EmulatedArm:
-    """Open while it is a context.
+    """Context manager for an emulated arm.
 
     Args:
-        robot: Its joints have servos; a motor's name is that of the servo's model.
-        scene: World in which it stands, MJCF, or the name of a file beside the arm's own model.
-        link: Name of the port; folders above it are made.
-        control: Where lines of `FaultCommands` are taken; None: nowhere.
-        posture_deg: Of joints at the start; others begin in the base pose.
-        seed: Of faults on the wire, when there are any.
-        held: Whether the servos hold at the start, as a program before has left them; else the arm falls at once.
-        servo_rules_only: Whether the judge finds only what the servos themselves reject.
+        robot: A robot with servos in its joints; the motor names are servo models.
+        scene: World of the arm, MJCF, or the name of a file next to the arm's own model.
+        link: Path of the port; missing folders are created.
+        control: Path of the control socket for `FaultCommands`; None: no socket.
+        posture_deg: Initial joint positions by name, degrees; other joints start in the base pose.
+        seed: Seed of communication faults.
+        held: Whether torque is on at the start, as left by an earlier program; otherwise the arm falls at once.
+        servo_rules_only: Whether the checker reports only packets that the servos themselves reject.
     """
 
     def __init__(
@@ -95,15 +95,15 @@ class EmulatedArm:
 
     @property
     def detail(self) -> str:
-        """What there is, in a few words."""
+        """One-line status: robot, port and the checker's counts."""
         port = self._link or self.emulator.port
-        plugged = f"at {port}" if self.emulator.plugged_in else f"unplugged from {port}"
-        judge = self.emulator.bus.judge
-        found = ", ".join(f"{count} {kind}" for kind, count in sorted(judge.counts.items())) or "nothing wrong"
-        return f"{self.robot.name} {plugged}; {judge.packets} packets, {found}"
+        location = f"at {port}" if self.emulator.plugged_in else f"unplugged from {port}"
+        checker = self.emulator.bus.checker
+        findings = ", ".join(f"{count} {kind}" for kind, count in sorted(checker.counts.items())) or "no findings"
+        return f"{self.robot.name} {location}; {checker.packets} packets, {findings}"
 
     def truth(self, now_ns: int) -> TruthState:
-        """Where everything is: joints in the order of the description, the end effector, and what lies about."""
+        """True state of the world: joints in the order of the description, the end effector, and free objects."""
         with self.emulator.lock:
             data = self.mechanics.data
             message = TruthState(time_ns=now_ns, joint_positions=self.mechanics.angles(self.robot.joint_names))
@@ -119,7 +119,7 @@ class EmulatedArm:
 
 @contextlib.contextmanager
 def _as_input_errors() -> Iterator[None]:
-    """Errors of the emulator, which is a package of its own, as those of paramove."""
+    """Converts errors of the emulator, a separate package, to those of paramove."""
     try:
         yield
     except EmulatorError as error:
@@ -127,13 +127,13 @@ def _as_input_errors() -> Iterator[None]:
 
 
 def emulated_servos(robot: RobotDescription) -> list[EmulatedServo]:
-    """Servos as `paramove arm setup` leaves them, in the order of its joints, standing in the base pose.
+    """Servos as configured by `paramove arm setup`, in the order of the joints, in the base pose.
 
     Raises:
-        InputError: The robot is no arm of servos.
+        InputError: The robot is not a servo arm.
     """
     if robot.bus is None or len(robot.servo_ids) != robot.n_joints:
-        raise InputError(f"{robot.name} is no arm of servos: its robot.yaml has no bus, or joints without servo_id")
+        raise InputError(f"{robot.name} is not a servo arm: its robot.yaml has no bus, or joints without servo_id")
     rows = zip(robot.motors, robot.servo_ids, robot.units.to_counts(robot.base_pose), strict=True)
     servos = [EmulatedServo(motor, number, robot.bus.baud_rate, float(count)) for motor, number, count in rows]
     for servo in servos:

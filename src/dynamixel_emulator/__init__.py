@@ -1,4 +1,4 @@
-"""Emulated Dynamixel servos: a serial port whose servos speak Protocol 2.0, byte by byte."""
+"""Emulated Dynamixel servos behind a serial port, with Protocol 2.0 byte by byte."""
 
 import lazy_loader
 

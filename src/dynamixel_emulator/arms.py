@@ -1,11 +1,11 @@
-"""Arms that are emulated by name, as their servos are set up to work with public drivers."""
+"""Arms that can be emulated by name, with servos set up for public drivers."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-from dynamixel_emulator.errors import EmulatorError, nearest
+from dynamixel_emulator.errors import EmulatorError, suggestion
 from dynamixel_emulator.mechanics import DrivenJoint
 from dynamixel_emulator.models import BAUD_RATES, PULSES_PER_TURN, model_named
 from dynamixel_emulator.servo import EmulatedServo
@@ -19,7 +19,7 @@ class Chain:
     """Servos on one bus.
 
     Attributes:
-        servos: Model, ID and the name of the joint of each.
+        servos: Model, ID and joint name of each servo.
         baud_rate: bit/s.
     """
 
@@ -27,19 +27,19 @@ class Chain:
     baud_rate: int = BAUD_RATE
 
     def emulated(self) -> list[EmulatedServo]:
-        """The servos, in the middle of their range. Raises EmulatorError for an unknown model."""
+        """Servos at mid-range. Raises EmulatorError for an unknown model or baud rate."""
         if self.baud_rate not in BAUD_RATES:
             rates = ", ".join(map(str, BAUD_RATES))
             raise EmulatorError(f"servos have the baud rates {rates}, found {self.baud_rate}")
         return [EmulatedServo(model, number, self.baud_rate) for model, number, _ in self.servos]
 
     def joints(self) -> list[DrivenJoint]:
-        """The joints that they drive without gears in a MuJoCo model, at 0 with 2048 pulses."""
+        """Joints of a MuJoCo model that the servos drive without gears; 2048 pulses at joint position 0."""
         return [DrivenJoint(name, COUNTS_PER_RAD) for _, _, name in self.servos]
 
     @property
     def numbers(self) -> dict[str, int]:
-        """IDs by the names of joints."""
+        """IDs by joint name."""
         return {name: number for _, number, name in self.servos}
 
 
@@ -58,7 +58,7 @@ ARMS = {
         ("joint1", "joint2", "joint3", "joint4", "gripper")
     ))),
 }  # fmt: skip
-"""Koch v1.1, the follower, as LeRobot numbers it; OpenMANIPULATOR-X as ROBOTIS ships it."""
+"""Koch v1.1 follower, numbered as in LeRobot; OpenMANIPULATOR-X as shipped by ROBOTIS."""
 
 
 def chain_of(words: list[str], baud_rate: int) -> Chain:
@@ -69,7 +69,7 @@ def chain_of(words: list[str], baud_rate: int) -> Chain:
     for word in words:
         model, _, number = word.partition(":")
         if not number and model not in ARMS:
-            raise EmulatorError(f"{word!r} is no arm ({nearest(word, ARMS)}) and no servo, which is MODEL:ID")
+            raise EmulatorError(f"{word!r} is neither an arm ({suggestion(word, ARMS)}) nor a servo, MODEL:ID")
         if not (number.isdecimal() and int(number) <= 252):
             raise EmulatorError(f"{word!r}: a servo is MODEL:ID with an ID from 0 to 252, such as xl430_w250:1")
         servos.append((model_named(model).name, int(number), f"servo_{number}"))

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from dynamixel_emulator.loops import STEP_S
 from dynamixel_emulator.mechanics import Mechanics
-from dynamixel_emulator.models import RAM_BEGINS
+from dynamixel_emulator.models import RAM_START
 from dynamixel_emulator.packets import (
     BROADCAST,
     HEADER,
@@ -19,30 +19,30 @@ from dynamixel_emulator.packets import (
     encoded,
 )
 from dynamixel_emulator.protocol_checker import ProtocolChecker
-from dynamixel_emulator.servo import Answer, EmulatedServo
+from dynamixel_emulator.servo import EmulatedServo, Reply
 
-FOR_SEVERAL = {Instruction.SYNC_READ, Instruction.SYNC_WRITE, Instruction.BULK_READ, Instruction.BULK_WRITE}
-FOR_SEVERAL |= {Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ}
+MULTI_SERVO = {Instruction.SYNC_READ, Instruction.SYNC_WRITE, Instruction.BULK_READ, Instruction.BULK_WRITE}
+MULTI_SERVO |= {Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ}
 
 LAST_ID = 252
 RESETS = {Instruction.FACTORY_RESET, Instruction.BACKUP}
 
-Said = tuple[float, bytes]
-"""How long after the question an answer begins, s, and its bytes."""
+TimedReply = tuple[float, bytes]
+"""Delay from the request to the start of a reply, s, and the bytes of the reply."""
 
 
 class EmulatedBus:
-    """Servos that hear the same bytes.
+    """Servos that share a bus.
 
     Args:
         servos: In the order of the chain.
-        mechanics: What they move, in the same order; without, each carries nothing.
-        servo_rules_only: Whether the judge finds only what the servos themselves reject.
+        mechanics: Mechanics that they move, in the same order; without, the servos have no load.
+        servo_rules_only: Whether the checker reports only packets that the servos themselves reject.
 
     Attributes:
-        servos: Those on the bus.
-        judge: Of all that arrives; may be replaced.
-        now_s: Time of the servos and of what they move, s.
+        servos: The servos on the bus.
+        checker: Checks all received bytes; may be replaced.
+        now_s: Simulated time of the servos and the mechanics, s.
     """
 
     def __init__(
@@ -51,49 +51,49 @@ class EmulatedBus:
         self.servos = list(servos)
         self.mechanics = mechanics
         self._chain = tuple(servos) if mechanics is not None else ()
-        self.judge = ProtocolChecker(self.servos, servo_rules_only=servo_rules_only)
+        self.checker = ProtocolChecker(self.servos, servo_rules_only=servo_rules_only)
         self._reader = PacketReader()
-        self.now_s = self._heard_s = 0.0
+        self.now_s = self._received_s = 0.0
         self._baud_rate = 0
         if mechanics is not None:
             for servo, (shaft, _) in zip(self._chain, mechanics.shafts(), strict=True):
-                servo.stand(shaft)
+                servo.set_shaft(shaft)
 
     def begin(self, now_s: float) -> None:
-        """The time of all servos is this one, s, from now on."""
+        """Sets the time of all servos, s."""
         self.now_s = now_s
         for servo in self.servos:
             servo.begin(now_s)
 
     def add(self, servo: EmulatedServo) -> None:
-        """One more, which moves nothing."""
+        """Adds a servo that is not connected to the mechanics."""
         servo.begin(self.now_s)
         self.servos.append(servo)
 
-    def receive(self, data: bytes, baud_rate: int, now_s: float) -> list[tuple[float, bytes]]:
-        """What the servos say to these bytes: for each answer, how long after now_s it begins, s, and its bytes.
+    def receive(self, data: bytes, baud_rate: int, now_s: float) -> list[TimedReply]:
+        """Executes received bytes; returns for each reply its delay after now_s, s, and its bytes.
 
-        The bytes came at now_s, s; the servos answer at once, as they are in their own time, which `run_to` brings on.
-        Bytes at another baud rate than before, or after a pause in the middle of a packet, begin anew.
+        The bytes arrived at now_s, s. The servos reply with their state at their own time, which `run_to` advances.
+        A change of the baud rate, or a pause in the middle of a packet, discards an incomplete packet.
         """
-        if baud_rate != self._baud_rate or (self._reader.waits and now_s - self._heard_s > 0.1):
-            self._reader.forget()
-            self.judge.give_up(now_s)
-        self._baud_rate, self._heard_s = baud_rate, now_s
-        said: list[tuple[float, bytes]] = []
-        for piece in self.judge.pieces(data, now_s):
-            said += self._obey(piece, baud_rate)
-        return said
+        if baud_rate != self._baud_rate or (self._reader.is_incomplete and now_s - self._received_s > 0.1):
+            self._reader.reset()
+            self.checker.discard_incomplete(now_s)
+        self._baud_rate, self._received_s = baud_rate, now_s
+        replies: list[TimedReply] = []
+        for piece in self.checker.pieces(data, now_s):
+            replies += self._execute(piece, baud_rate)
+        return replies
 
-    def _obey(self, data: bytes, baud_rate: int) -> Iterator[Said]:
+    def _execute(self, data: bytes, baud_rate: int) -> Iterator[TimedReply]:
         for packet in self._reader.feed(data):
-            hearing = [servo for servo in self.servos if servo.listens and servo.hears_at(baud_rate)]
-            for servo in hearing:
+            receivers = [servo for servo in self.servos if servo.listens and servo.listens_at(baud_rate)]
+            for servo in receivers:
                 servo.packet_received(self.now_s)
-            yield from self._answers(packet, hearing)
+            yield from self._replies(packet, receivers)
 
     def run_to(self, now_s: float) -> None:
-        """All servos, and what they move, go on until this time, s."""
+        """Advances all servos and the mechanics to this time, s."""
         while self.mechanics is not None and self.now_s + STEP_S <= now_s:
             self.now_s += STEP_S
             efforts = [servo.effort() for servo in self._chain]
@@ -107,66 +107,66 @@ class EmulatedBus:
             else:
                 servo.run_to(now_s)
 
-    def _answers(self, packet: Packet | DamagedPacket, servos: list[EmulatedServo]) -> Iterator[Said]:
+    def _replies(self, packet: Packet | DamagedPacket, servos: list[EmulatedServo]) -> Iterator[TimedReply]:
         if isinstance(packet, DamagedPacket):
-            yield from _together(
-                _status(servo, Answer(StatusError.CHECKSUM))
+            yield from _simultaneous(
+                _status(servo, Reply(StatusError.CHECKSUM))
                 for servo in servos
-                if servo.id == packet.id and servo.answers(Instruction.WRITE)
+                if servo.id == packet.id and servo.replies_to(Instruction.WRITE)
             )
-        elif packet.instruction in FOR_SEVERAL:
-            yield from self._for_several(packet, servos)
+        elif packet.instruction in MULTI_SERVO:
+            yield from self._execute_multi_servo(packet, servos)
         elif packet.id == BROADCAST:
-            yield from self._for_all(packet, servos)
+            yield from self._execute_broadcast(packet, servos)
         else:
-            yield from _together(self._for_one(packet, servos))
+            yield from _simultaneous(self._execute_single(packet, servos))
 
-    def _for_all(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[Said]:
-        """Only a ping is answered, by each servo when those of lower ids have had their time."""
+    def _execute_broadcast(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[TimedReply]:
+        """Executes an instruction on all servos; they reply only to a ping, in the order of their IDs."""
         resets_all = packet.instruction == Instruction.FACTORY_RESET and packet.parameters[:1] == b"\xff"
         if packet.instruction == Instruction.READ or resets_all:
             return
-        told = [(servo.id, _status(servo, servo.do(packet.instruction, packet.parameters))) for servo in servos]
+        replies = [(servo.id, _status(servo, servo.do(packet.instruction, packet.parameters))) for servo in servos]
         if packet.instruction == Instruction.PING:
-            for number in sorted({number for number, _ in told}):
-                yield from _together(answer for one, answer in told if one == number)
+            for number in sorted({number for number, _ in replies}):
+                yield from _simultaneous(reply for one, reply in replies if one == number)
 
-    def _for_one(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[Said]:
+    def _execute_single(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[TimedReply]:
         for servo in servos:
             if servo.id == packet.id and packet.instruction != Instruction.STATUS:
-                # Who is told another ID, delay or level answers with the old ones.
-                answers, delay_s, number = servo.answers(packet.instruction), servo.return_delay_s, servo.id
-                answer = servo.do(packet.instruction, packet.parameters)
-                if answers:
-                    yield delay_s, _encoded(number, answer)
+                # The reply to a change of ID, delay or status return level uses the old values.
+                replies, delay_s, number = servo.replies_to(packet.instruction), servo.return_delay_s, servo.id
+                reply = servo.do(packet.instruction, packet.parameters)
+                if replies:
+                    yield delay_s, _encoded(number, reply)
             elif servo.memory["Secondary(Shadow) ID"] == packet.id <= LAST_ID and not _changes_eeprom(packet):
                 servo.do(packet.instruction, packet.parameters)
 
-    def _for_several(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[Said]:
-        """Instructions that name servos in their parameters: each acts, and those that read answer in that order."""
+    def _execute_multi_servo(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[TimedReply]:
+        """Executes an instruction that lists servos in its parameters; those that are read reply in this order."""
         fast = packet.instruction in (Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ)
-        parts: list[list[tuple[EmulatedServo, Answer]]] = []
+        parts: list[list[tuple[EmulatedServo, Reply]]] = []
         for number, address, data in _tasks(packet):
             named = [servo for servo in servos if servo.id == number]
             if isinstance(data, bytes):
                 for servo in named:
                     servo.do(Instruction.WRITE, address.to_bytes(2, "little") + data)
                 continue
-            asked = address.to_bytes(2, "little") + data.to_bytes(2, "little")
-            answering = [servo for servo in named if servo.answers(packet.instruction)]
-            if not answering:
-                break  # each speaks after the one before it: those after a silent one never do
-            parts.append([(servo, servo.do(Instruction.READ, asked)) for servo in answering])
+            request = address.to_bytes(2, "little") + data.to_bytes(2, "little")
+            replying = [servo for servo in named if servo.replies_to(packet.instruction)]
+            if not replying:
+                break  # each replies after its predecessor: servos after one that does not reply wait forever
+            parts.append([(servo, servo.do(Instruction.READ, request)) for servo in replying])
         if fast and parts:
             sizes = [data for _, _, data in _tasks(packet) if isinstance(data, int)]
-            yield parts[0][0][0].return_delay_s, _joined(parts, 1 + sum(size + 4 for size in sizes))
+            yield parts[0][0][0].return_delay_s, _fast_reply(parts, 1 + sum(size + 4 for size in sizes))
         elif not fast:
-            for answers in parts:
-                yield from _together(_status(servo, answer) for servo, answer in answers)
+            for replies in parts:
+                yield from _simultaneous(_status(servo, reply) for servo, reply in replies)
 
 
 def _tasks(packet: Packet) -> Iterator[tuple[int, int, int | bytes]]:
-    """Of each named servo: its id, an address, and how many bytes to read from there or which to write there."""
+    """For each listed servo: its id, an address, and the number of bytes to read or the bytes to write there."""
     words = packet.parameters
 
     def word(at: int) -> int:
@@ -191,47 +191,47 @@ def _tasks(packet: Packet) -> Iterator[tuple[int, int, int | bytes]]:
 
 
 def _changes_eeprom(packet: Packet) -> bool:
-    """Which a servo that is called by its secondary ID does not."""
+    """Whether a packet changes EEPROM, which a servo addressed by its secondary ID ignores."""
     writes = packet.instruction in (Instruction.WRITE, Instruction.REG_WRITE)
-    return packet.instruction in RESETS or (writes and int.from_bytes(packet.parameters[:2], "little") < RAM_BEGINS)
+    return packet.instruction in RESETS or (writes and int.from_bytes(packet.parameters[:2], "little") < RAM_START)
 
 
-def _encoded(number: int, answer: Answer) -> bytes:
-    return encoded(Packet(number, Instruction.STATUS, bytes([answer.error]) + answer.data))
+def _encoded(number: int, reply: Reply) -> bytes:
+    return encoded(Packet(number, Instruction.STATUS, bytes([reply.error]) + reply.data))
 
 
-def _status(servo: EmulatedServo, answer: Answer) -> tuple[float, bytes]:
-    return servo.return_delay_s, _encoded(servo.id, answer)
+def _status(servo: EmulatedServo, reply: Reply) -> TimedReply:
+    return servo.return_delay_s, _encoded(servo.id, reply)
 
 
-def _together(answers: Iterable[Said]) -> Iterator[Said]:
-    """Answers of servos with one id, which speak at once: what is on the wire then."""
-    told = list(answers)
-    if told:
-        yield told[0][0], collided([data for _, data in told])
+def _simultaneous(replies: Iterable[TimedReply]) -> Iterator[TimedReply]:
+    """Replies of servos with the same id, which transmit simultaneously: the resulting bytes on the wire."""
+    colliding = list(replies)
+    if colliding:
+        yield colliding[0][0], collided([data for _, data in colliding])
 
 
-def collided(spoken: Sequence[bytes]) -> bytes:
-    """Bytes on the wire when all speak at once: a low level of one hides a high one of others.
+def collided(transmissions: Sequence[bytes]) -> bytes:
+    """Bytes on the wire when servos transmit simultaneously: a low level of one overrides a high level of the others.
 
-    Their clocks are not the same: each speaker is taken to be a bit later than the one before.
+    Their clocks differ: each transmission after the first is assumed to be shifted by one bit.
     """
-    wire = bytearray(spoken[0])
-    for data in spoken[1:]:
-        late = int.from_bytes(data, "little") << 1
+    wire = bytearray(transmissions[0])
+    for data in transmissions[1:]:
+        shifted = int.from_bytes(data, "little") << 1
         wire += b"\xff" * (len(data) - len(wire))
-        for i, byte in enumerate(late.to_bytes(len(data) + 1, "little")[: len(data)]):
+        for i, byte in enumerate(shifted.to_bytes(len(data) + 1, "little")[: len(data)]):
             wire[i] &= byte
     return bytes(wire)
 
 
-def _joined(parts: list[list[tuple[EmulatedServo, Answer]]], length: int) -> bytes:
-    """The one packet of a fast read: error, id, data and checksum of each servo; each checksum is of all before it.
+def _fast_reply(parts: list[list[tuple[EmulatedServo, Reply]]], length: int) -> bytes:
+    """Common reply to a fast read: error, id, data and checksum of each servo; a checksum covers all bytes before it.
 
-    `length` is that with all servos: where one is missing, the packet ends early.
+    `length` counts all requested servos: if one is missing, the packet ends early.
     """
     data = HEADER + bytes([0, BROADCAST]) + length.to_bytes(2, "little") + bytes([Instruction.STATUS])
-    for answers in parts:
-        spoken = [bytes([answer.error, servo.id]) + answer.data for servo, answer in answers]
-        data += collided([one + checksum(data + one).to_bytes(2, "little") for one in spoken])
+    for replies in parts:
+        contents = [bytes([reply.error, servo.id]) + reply.data for servo, reply in replies]
+        data += collided([one + checksum(data + one).to_bytes(2, "little") for one in contents])
     return data

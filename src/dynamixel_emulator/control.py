@@ -1,6 +1,6 @@
-"""A Unix socket at which emulated servos are told what shall go wrong: one line a verb, one line an answer.
+"""Unix socket for fault commands to emulated servos: one line per command, one line per reply.
 
-An answer is `ok`, `ok` and text, or `error:` and what would have been right. Only the user who opened it may connect.
+A reply is `ok`, `ok` and text, or `error:` and a message. Only the user who opened the socket can connect.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from typing import Self
 
 from dynamixel_emulator.errors import EmulatorError
 
-LONGEST_PATH = 107
-"""Bytes of the name of a Unix socket."""
-LONGEST_LINE = 4096
+MAX_PATH_BYTES = 107
+"""Maximum length of the path of a Unix socket."""
+MAX_LINE_BYTES = 4096
 IDLE_S = 0.05
-ANSWER_S = 10.0
+REPLY_TIMEOUT_S = 10.0
 
 
 class ControlSocket:
-    """Open while it is a context.
+    """Context manager that serves a control socket.
 
     Args:
-        path: Where; its folder is there, and nothing else is in its place.
-        do: What a line does; it returns the answer, or raises EmulatorError.
+        path: Path of the socket; its folder exists, the file does not.
+        do: Executes a line; returns the reply, or raises EmulatorError.
     """
 
     def __init__(self, path: Path, do: Callable[[str], str]) -> None:
@@ -38,9 +38,9 @@ class ControlSocket:
         self._thread = threading.Thread(target=self._serve, name="emulator_control", daemon=True)
 
     def __enter__(self) -> Self:
-        if len(os.fsencode(self.path)) > LONGEST_PATH:
-            raise EmulatorError(f"{self.path} is too long for a socket: at most {LONGEST_PATH} bytes")
-        _clear_away(self.path)
+        if len(os.fsencode(self.path)) > MAX_PATH_BYTES:
+            raise EmulatorError(f"{self.path} is too long for a socket path: at most {MAX_PATH_BYTES} bytes")
+        _remove_stale_socket(self.path)
         self._listener = socket.socket(socket.AF_UNIX)
         os.fchmod(self._listener.fileno(), 0o600)
         try:
@@ -48,7 +48,9 @@ class ControlSocket:
         except OSError as error:
             self._listener.close()
             missing = error.errno == errno.ENOENT
-            raise EmulatorError(f"no control socket at {self.path}: {error.strerror}", missing=missing) from error
+            raise EmulatorError(
+                f"cannot open a control socket at {self.path}: {error.strerror}", missing=missing
+            ) from error
         self._listener.listen()
         self._thread.start()
         return self
@@ -60,29 +62,29 @@ class ControlSocket:
         self.path.unlink(missing_ok=True)
 
     def _serve(self) -> None:
-        """One caller after the other; the next waits until this one has hung up."""
+        """Serves one client at a time; the next one waits until the client disconnects."""
         while not self._stopped.is_set():
             ready, _, _ = select.select([self._listener], [], [], IDLE_S)
             if ready:
-                caller, _ = self._listener.accept()
-                with caller, contextlib.suppress(ConnectionError):
-                    self._read(caller)
+                client, _ = self._listener.accept()
+                with client, contextlib.suppress(ConnectionError):
+                    self._read(client)
 
-    def _read(self, caller: socket.socket) -> None:
-        heard = b""
+    def _read(self, client: socket.socket) -> None:
+        received = b""
         while not self._stopped.is_set():
-            ready, _, _ = select.select([caller], [], [], IDLE_S)
+            ready, _, _ = select.select([client], [], [], IDLE_S)
             if not ready:
                 continue
-            data = caller.recv(LONGEST_LINE)
-            heard += data
-            *lines, heard = heard.split(b"\n")
+            data = client.recv(MAX_LINE_BYTES)
+            received += data
+            *lines, received = received.split(b"\n")
             for line in lines:
-                caller.sendall(self._answer(line).encode() + b"\n")
-            if not data or len(heard) > LONGEST_LINE:
+                client.sendall(self._reply(line).encode() + b"\n")
+            if not data or len(received) > MAX_LINE_BYTES:
                 return
 
-    def _answer(self, line: bytes) -> str:
+    def _reply(self, line: bytes) -> str:
         try:
             return f"ok {self._do(line.decode(errors='replace').strip())}".rstrip()
         except EmulatorError as error:
@@ -90,35 +92,35 @@ class ControlSocket:
 
 
 def request(path: Path, line: str) -> str:
-    """Send a line to the socket there; returns the text after `ok`.
+    """Sends a line to the control socket at `path`; returns the text after `ok`.
 
     Raises:
-        EmulatorError: Nobody listens there, or the line was rejected.
+        EmulatorError: No emulator listens there, or the emulator rejected the line.
     """
-    with socket.socket(socket.AF_UNIX) as caller:
-        caller.settimeout(ANSWER_S)
+    with socket.socket(socket.AF_UNIX) as client:
+        client.settimeout(REPLY_TIMEOUT_S)
         try:
-            caller.connect(str(path))
-            caller.sendall(line.encode() + b"\n")
-            answer = caller.makefile(encoding="utf-8").readline().strip()
+            client.connect(str(path))
+            client.sendall(line.encode() + b"\n")
+            reply = client.makefile(encoding="utf-8").readline().strip()
         except OSError as error:
             raise EmulatorError(f"no emulator listens at {path}: {error}", missing=True) from error
-    kind, _, text = answer.partition(" ")
+    kind, _, text = reply.partition(" ")
     if kind != "ok":
-        raise EmulatorError(text or f"the emulator at {path} hung up")
+        raise EmulatorError(text or f"the emulator at {path} closed the connection")
     return text
 
 
-def _clear_away(path: Path) -> None:
-    """A socket that a killed program left behind. Raises EmulatorError for one in use, and for anything else."""
+def _remove_stale_socket(path: Path) -> None:
+    """Removes the socket of a killed program. Raises EmulatorError for a socket in use and for any other file."""
     if not path.exists():
         return
     if not path.is_socket():
-        raise EmulatorError(f"{path} is there already and no socket: name another path for the control socket")
-    with socket.socket(socket.AF_UNIX) as caller:
+        raise EmulatorError(f"{path} exists and is not a socket: choose another path for the control socket")
+    with socket.socket(socket.AF_UNIX) as client:
         try:
-            caller.connect(str(path))
+            client.connect(str(path))
         except OSError:
             path.unlink(missing_ok=True)
         else:
-            raise EmulatorError(f"{path} is the control socket of a running program: name another path")
+            raise EmulatorError(f"{path} is the control socket of a running program: choose another path")

@@ -1,4 +1,4 @@
-"""Emulated servos behind a pseudo-terminal: to any program they are a serial port with a Dynamixel bus."""
+"""Emulated servos behind a pseudo-terminal, which any program can use as a serial port with a Dynamixel bus."""
 
 from __future__ import annotations
 
@@ -28,42 +28,42 @@ from dynamixel_emulator.wire_faults import WireFaults
 BITS_PER_BYTE = 10
 """Start bit, eight bits, stop bit."""
 IDLE_S = 0.005
+"""Polling interval of an idle line, and maximum simulated time that a reply waits for."""
 PSEUDO_TERMINALS = "/dev/pts/"
-"""Between two looks at a quiet line, and of the servos' time at most before what was heard is answered."""
-LATE_S = 0.02
-"""So much the servos' time may be behind; what the system does not let them have beyond, passes them by."""
-FIRST = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+MAX_LAG_S = 0.02
+"""Maximum delay of the servos' time behind real time; time lost beyond it is dropped."""
+REAL_TIME = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
 MAX_BYTES = 4096
 TCGETS2 = 0x802C542A
-"""Settings of a line with its rates as numbers (Linux, asm-generic/ioctls.h). Python's `termios` reads only rates that
-have a name; pyserial sets those, programs in Rust set numbers."""
+"""Reads terminal settings with numeric baud rates (Linux, asm-generic/ioctls.h). Python's `termios` reads only the
+predefined rates, which pyserial sets; programs in Rust set numeric ones."""
 TIOCGEXCL = 0x80045440
-"""Whether a program has asked to be the only one at the line (Linux, asm-generic/ioctls.h)."""
+"""Reads whether a program has exclusive access to the terminal (Linux, asm-generic/ioctls.h)."""
 TERMIOS2 = struct.Struct("4I B 19s 2I")
 """Input, output, control and local modes, line discipline, control characters, input and output speed."""
 
 
 class DynamixelEmulator:
-    """Serves a bus at `port` while it is open.
+    """Context manager that serves a bus at `port`.
 
-    Answers take as long as their bytes, those of the question and Return Delay Time (9) say. What the line's baud rate
-    is, the client has set as at any serial port; servos at another one hear nothing. Real servos have processors of
-    their own: where the system allows it, the thread that serves the port runs before all other programs.
+    Replies are delayed by the transmission time of request and reply, and by Return Delay Time (9). The client sets the
+    baud rate as at any serial port; servos with another baud rate receive nothing. Real servos have their own
+    processors: where the system allows it, the thread that serves the port has priority over all other programs.
 
     Args:
-        servos: In the order of the chain.
-        link: A symbolic link to make to the port, so that its name does not change from run to run.
-        mechanics: What the servos move, in the same order; without, each carries nothing.
-        servo_rules_only: Whether the judge finds only what the servos themselves reject, not jumps: for the programs of
-            others.
+        servos: Servos in the order of the chain.
+        link: Path of a symbolic link to the port, so that its name is the same in each run.
+        mechanics: Mechanics that the servos move, in the same order; without, the servos have no load.
+        servo_rules_only: Whether the checker reports only packets that the servos themselves reject, not jumps of the
+            goal, which are common in third-party programs.
 
     Raises:
-        EmulatorError: Something else is at the path of the link, or another emulator serves it.
+        EmulatorError: The path of the link is another file, or another emulator serves it.
 
     Attributes:
-        faults: What goes wrong on the wire; may be replaced at any time.
+        faults: Communication faults; may be replaced at any time.
         link: As given.
-        port: Name of the terminal; another one after `plug_in`.
+        port: Name of the terminal; changes with `plug_in`.
     """
 
     def __init__(
@@ -76,12 +76,12 @@ class DynamixelEmulator:
         self.bus = EmulatedBus(servos, mechanics, servo_rules_only)
         self.faults = WireFaults()
         self.lock = threading.Lock()
-        """Held while the servos hear and move; hold it to look at them."""
+        """Held while the servos receive and move; hold it to access them."""
         self.link = link
-        self._began_s = time.monotonic()
-        self._stopped, self._moved = threading.Event(), threading.Event()
+        self._start_s = time.monotonic()
+        self._stopped, self._plug_changed = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._serve, name="dynamixel_emulator", daemon=True)
-        self._wanted = self.plugged_in = False
+        self._plug_requested = self.plugged_in = False
         self._error: Exception | None = None
         with contextlib.ExitStack() as claimed:
             if link is not None:
@@ -103,132 +103,133 @@ class DynamixelEmulator:
         self._claimed.close()
 
     def check(self) -> None:
-        """Raises RuntimeError if the thread that serves the port has ended by an error."""
+        """Raises RuntimeError if the thread that serves the port has failed."""
         if self._error is not None:
             raise RuntimeError(f"the emulated servos have stopped: {self._error}") from self._error
 
     def unplug(self) -> None:
-        """Takes the port away, as if its plug were pulled; the servos keep their power and go on."""
-        self._move_plug(False)
+        """Removes the port, as if its plug were pulled; the servos keep their power and continue."""
+        self._set_plugged_in(False)
 
     def plug_in(self) -> None:
-        """A new port, usually of another name; the link leads to it."""
-        self._move_plug(True)
+        """Opens a new port, usually with another name; the link points to it."""
+        self._set_plugged_in(True)
 
-    def _move_plug(self, wanted: bool) -> None:
-        """The thread that serves the port does it, between two questions; returns when it is done."""
-        self._moved.clear()
-        self._wanted = wanted
-        while self._thread.is_alive() and self.plugged_in != wanted:
-            self._moved.wait(IDLE_S)
+    def _set_plugged_in(self, plugged_in: bool) -> None:
+        """Asks the thread that serves the port to open or close it between two requests; waits until it has."""
+        self._plug_changed.clear()
+        self._plug_requested = plugged_in
+        while self._thread.is_alive() and self.plugged_in != plugged_in:
+            self._plug_changed.wait(IDLE_S)
 
     def _open(self) -> None:
-        self._ours, self._theirs = os.openpty()
-        tty.setraw(self._theirs)
-        os.set_blocking(self._ours, False)
-        self.port = os.ttyname(self._theirs)
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.port = os.ttyname(self._slave)
         if self.link is not None:
-            ours = self.link.is_symlink() and os.readlink(self.link).startswith(PSEUDO_TERMINALS)
-            if os.path.lexists(self.link) and not ours:
+            is_our_link = self.link.is_symlink() and os.readlink(self.link).startswith(PSEUDO_TERMINALS)
+            if os.path.lexists(self.link) and not is_our_link:
                 raise EmulatorError(
-                    f"{self.link} is there already and no link to a pseudo-terminal: name another path for the port"
+                    f"{self.link} exists and is not a link to a pseudo-terminal: choose another path for the port"
                 )
             self.link.unlink(missing_ok=True)
             self.link.symlink_to(self.port)
-        self._wanted = self.plugged_in = True
+        self._plug_requested = self.plugged_in = True
 
     def _close(self) -> None:
-        if self.link is not None:  # first: the terminal's name may be another program's as soon as it is closed
+        if self.link is not None:  # first: once the terminal is closed, another program may get its name
             self.link.unlink(missing_ok=True)
-        os.close(self._ours)
-        os.close(self._theirs)
+        os.close(self._master)
+        os.close(self._slave)
         self.plugged_in = False
 
     @property
     def baud_rate(self) -> int:
-        """To which the client has set the line, bit/s."""
-        speed: int = TERMIOS2.unpack(fcntl.ioctl(self._theirs, TCGETS2, bytes(TERMIOS2.size)))[-1]
+        """Baud rate that the client has set, bit/s."""
+        speed: int = TERMIOS2.unpack(fcntl.ioctl(self._slave, TCGETS2, bytes(TERMIOS2.size)))[-1]
         return speed
 
     def _now_s(self) -> float:
-        return time.monotonic() - self._began_s
+        return time.monotonic() - self._start_s
 
     def _serve(self) -> None:
         try:
             self._serve_until_stopped()
-        except (RuntimeError, OSError) as error:  # a world that broke, a terminal that the system took away
+        except (RuntimeError, OSError) as error:  # unstable simulation, or terminal removed by the system
             self._error = error
 
     def _serve_until_stopped(self) -> None:
-        lost_s = 0.0
-        _go_first(True)
+        dropped_s = 0.0
+        _set_priority(True)
         while not self._stopped.is_set():
-            if self._wanted != self.plugged_in:
-                self._open() if self._wanted else self._close()
-                self._moved.set()
-            behind_s = self._now_s() - lost_s - self.bus.now_s
-            heard, now_s = self._read(max(0.0, min(IDLE_S, IDLE_S - behind_s))), self._now_s()
+            if self._plug_requested != self.plugged_in:
+                self._open() if self._plug_requested else self._close()
+                self._plug_changed.set()
+            lag_s = self._now_s() - dropped_s - self.bus.now_s
+            received, now_s = self._read(max(0.0, min(IDLE_S, IDLE_S - lag_s))), self._now_s()
             with self.lock:
-                behind_s = now_s - lost_s - self.bus.now_s
-                if behind_s > LATE_S:
-                    lost_s += behind_s - LATE_S
-                    _go_first(time.thread_time() < 0.5 * now_s)  # not a world that is too slow for this machine
-                self.bus.run_to(min(now_s - lost_s, self.bus.now_s + IDLE_S))
-                answers = self.bus.receive(heard, self.baud_rate, now_s) if heard else []
-            if heard:
-                self._say(heard, self.faults.told(heard, answers), now_s)
+                lag_s = now_s - dropped_s - self.bus.now_s
+                if lag_s > MAX_LAG_S:
+                    dropped_s += lag_s - MAX_LAG_S
+                    _set_priority(time.thread_time() < 0.5 * now_s)  # no priority for a simulation that is too slow
+                self.bus.run_to(min(now_s - dropped_s, self.bus.now_s + IDLE_S))
+                replies = self.bus.receive(received, self.baud_rate, now_s) if received else []
+            if received:
+                self._send(received, self.faults.apply(received, replies), now_s)
 
-    def _read(self, within_s: float) -> bytes:
-        """What the client has written, waiting so long for it."""
+    def _read(self, timeout_s: float) -> bytes:
+        """Bytes from the client; waits at most this time for them."""
         if not self.plugged_in:
-            self._stopped.wait(within_s)
+            self._stopped.wait(timeout_s)
             return b""
-        ready, _, _ = select.select([self._ours], [], [], within_s)
-        if not ready and within_s > 0.0:
-            self._forget_who_was_killed()
-        return os.read(self._ours, MAX_BYTES) if ready else b""
+        ready, _, _ = select.select([self._master], [], [], timeout_s)
+        if not ready and timeout_s > 0.0:
+            self._release_exclusive_access()
+        return os.read(self._master, MAX_BYTES) if ready else b""
 
-    def _forget_who_was_killed(self) -> None:
-        """A program that was the only one at the line, and is no more, leaves it closed to others while it is open.
+    def _release_exclusive_access(self) -> None:
+        """Releases the exclusive access of a program that was killed; such programs also hold a file lock on the port.
 
-        A real one would not be: nobody else has it open, as this emulator has. Such programs hold a lock on it, too.
+        A real port releases it when the last program closes it, but the emulator itself keeps the terminal open.
         """
-        if not struct.unpack("i", fcntl.ioctl(self._theirs, TIOCGEXCL, bytes(4)))[0]:
+        if not struct.unpack("i", fcntl.ioctl(self._slave, TIOCGEXCL, bytes(4)))[0]:
             return
         with contextlib.suppress(BlockingIOError):
-            fcntl.flock(self._theirs, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            fcntl.ioctl(self._theirs, termios.TIOCNXCL)
-            fcntl.flock(self._theirs, fcntl.LOCK_UN)
+            fcntl.flock(self._slave, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.ioctl(self._slave, termios.TIOCNXCL)
+            fcntl.flock(self._slave, fcntl.LOCK_UN)
 
-    def _say(self, question: bytes, answers: list[tuple[float, bytes]], heard_s: float) -> None:
+    def _send(self, request: bytes, replies: list[tuple[float, bytes]], received_s: float) -> None:
+        """Writes the replies at the times at which a serial line would have transmitted them."""
         byte_s = BITS_PER_BYTE / self.baud_rate if self.baud_rate else 0.0
-        free_s = heard_s + len(question) * byte_s  # it was there at once; on a wire it takes its time
-        for delay_s, answer in answers:
-            free_s += delay_s + len(answer) * byte_s
-            early_s = free_s - self._now_s()
-            if early_s > 0.0:
-                self._stopped.wait(early_s)
-            with contextlib.suppress(BlockingIOError):  # a client that never reads loses what its port cannot hold
-                os.write(self._ours, answer)
+        line_free_s = received_s + len(request) * byte_s  # a pseudo-terminal has no transmission time
+        for delay_s, reply in replies:
+            line_free_s += delay_s + len(reply) * byte_s
+            wait_s = line_free_s - self._now_s()
+            if wait_s > 0.0:
+                self._stopped.wait(wait_s)
+            with contextlib.suppress(BlockingIOError):  # unread replies are dropped when the port is full
+                os.write(self._master, reply)
 
 
-def _go_first(first: bool) -> None:
-    """Where the system allows it, the calling thread runs before all others, or like any other."""
+def _set_priority(real_time: bool) -> None:
+    """Gives the calling thread real-time or normal priority, where the system allows it."""
     with contextlib.suppress(PermissionError):
-        os.sched_setscheduler(0, FIRST if first else os.SCHED_OTHER, os.sched_param(int(first)))
+        os.sched_setscheduler(0, REAL_TIME if real_time else os.SCHED_OTHER, os.sched_param(int(real_time)))
 
 
 def _claim(link: Path) -> socket.socket:
-    """Keeps other emulators from this link, also those of other programs, until it is closed or its program ends."""
+    """Reserves this link for one emulator on this machine, until the socket is closed or the program ends."""
     claim = socket.socket(socket.AF_UNIX)
     name = hashlib.sha256(os.fsencode(link.absolute())).hexdigest()
     try:
-        claim.bind(f"\0dynamixel-emulator-{name}")  # of the system, not of a folder: nothing is left behind
+        claim.bind(f"\0dynamixel-emulator-{name}")  # abstract socket: leaves no file behind
     except OSError as error:
         claim.close()
         if error.errno != errno.EADDRINUSE:
             raise
         raise EmulatorError(
-            f"{link} is the port of another emulator, which is running: end that one, or name another path"
+            f"{link} is the port of another running emulator: stop that one, or choose another path"
         ) from None
     return claim

@@ -1,4 +1,4 @@
-"""What a user of the emulator did wrong."""
+"""Errors that the user of the emulator can correct."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Iterable
 
 
 class EmulatorError(ValueError):
-    """A file, a port or a command that the emulator cannot use; one line with what would work.
+    """The emulator cannot use a file, a port or a command; the message is one line and names what is valid.
 
     Attributes:
-        missing: Whether what was named does not exist.
+        missing: Whether the named file, port or emulator does not exist.
     """
 
     def __init__(self, message: str, missing: bool = False) -> None:
@@ -18,8 +18,8 @@ class EmulatorError(ValueError):
         self.missing = missing
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """The nearest of the known words, otherwise all of them, as a phrase for an error."""
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """Suggests the closest known word, or lists all of them, as a phrase for an error message."""
     choices = sorted(known)
     close = difflib.get_close_matches(word, choices, n=1)
     return f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(choices)}"

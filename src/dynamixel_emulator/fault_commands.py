@@ -1,6 +1,6 @@
-"""What may go wrong with emulated servos, on purpose, each by one line of text: `block elbow`, `voltage 9.4`.
+"""Injects faults into emulated servos, each by a command of one line of text: `block elbow`, `voltage 9.4`.
 
-The same lines come over the control socket (`dynamixel_emulator.control`).
+The control socket (`dynamixel_emulator.control`) accepts the same lines.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import asdict, fields
 
 from dynamixel_emulator.body import HardwareError
 from dynamixel_emulator.emulator import DynamixelEmulator
-from dynamixel_emulator.errors import EmulatorError, nearest
+from dynamixel_emulator.errors import EmulatorError, suggestion
 from dynamixel_emulator.mechanics import DrivenJoint
 from dynamixel_emulator.models import BAUD_RATES, model_named
 from dynamixel_emulator.motor import RAD_PER_PULSE
@@ -20,18 +20,18 @@ from dynamixel_emulator.servo import EmulatedServo
 from dynamixel_emulator.wire_faults import WireFaults
 
 UNGEARED = DrivenJoint("", 1.0 / RAD_PER_PULSE)
-FARTHEST_DEG = 720.0
-ELSEWHERE = 700.0
-"""Pulses by which a second servo of an id stands away from the first."""
+MAX_LEAD_DEG = 720.0
+DUPLICATE_OFFSET = 700.0
+"""Distance of a second servo with the same id from the first, pulses."""
 
 
 class FaultCommands:
-    """Does what a line says.
+    """Executes fault commands.
 
     Args:
-        emulator: To whom.
-        names: Ids of servos by the names of their joints, which may be used instead.
-        joints: Pulses of servos, by ids; those of others turn with their joints, which are at 0 with 2048 pulses.
+        emulator: The emulator to inject faults into.
+        names: Servo ids by joint name; commands accept both.
+        joints: Gear ratio and zero of each servo, by id; others have no gear, and 2048 pulses at joint position 0.
     """
 
     def __init__(
@@ -44,48 +44,49 @@ class FaultCommands:
         self.names, self._joints = dict(names or {}), dict(joints or {})
 
     def do(self, line: str) -> str:
-        """The answer: empty, or text in one line.
+        """Executes one command; returns its output: empty, or one line of text.
 
         Raises:
-            EmulatorError: The line is none of the verbs, or cannot be done; the text says what would have been right.
+            EmulatorError: The command is unknown or cannot be executed; the message names what is valid.
         """
         words = line.split()
-        if not words or words[0] not in VERBS:
-            raise EmulatorError(f"{line!r} is no command of the emulator; {nearest(words[0] if words else '', VERBS)}")
-        usage, verb = VERBS[words[0]]
+        if not words or words[0] not in COMMANDS:
+            hint = suggestion(words[0] if words else "", COMMANDS)
+            raise EmulatorError(f"{line!r} is not a command of the emulator; {hint}")
+        usage, command = COMMANDS[words[0]]
         if len(words) < sum(not word.startswith("[") for word in usage.split()):
             raise EmulatorError(f"{line!r}: {usage}")
-        if verb in (_unplug, _plug_in):  # these wait for the thread that holds the lock from time to time
-            return verb(self, words[1:])
+        if command in (_unplug, _plug_in):  # these wait for the thread that periodically holds the lock
+            return command(self, words[1:])
         with self.emulator.lock:
-            return verb(self, words[1:])
+            return command(self, words[1:])
 
-    def servos(self, who: str) -> list[EmulatedServo]:
-        """All of an id, or of the name of a joint. Raises EmulatorError if there is none."""
-        number = self.names.get(who)
-        if number is None and who.isdecimal():
-            number = int(who)
-        found = [servo for servo in self.emulator.bus.servos if servo.id == number]
-        if not found:
+    def servos(self, name: str) -> list[EmulatedServo]:
+        """All servos with this id or joint name. Raises EmulatorError if there is none."""
+        number = self.names.get(name)
+        if number is None and name.isdecimal():
+            number = int(name)
+        matching = [servo for servo in self.emulator.bus.servos if servo.id == number]
+        if not matching:
             known = sorted({*self.names, *(str(servo.id) for servo in self.emulator.bus.servos)})
-            raise EmulatorError(f"no servo {who!r}; {nearest(who, known)}")
-        return found
+            raise EmulatorError(f"no servo {name!r}; {suggestion(name, known)}")
+        return matching
 
     def pulses(self, servo: EmulatedServo, angle: float) -> float:
-        """Of the encoder of a servo whose joint is at this angle, rad."""
+        """Encoder position, pulses, of a servo whose joint is at this angle, rad."""
         joint = self._joints.get(servo.id, UNGEARED)
         return joint.zero_counts + joint.counts_per_rad * angle
 
 
 def _each(change: Callable[[EmulatedServo, list[str]], None]) -> Callable[[FaultCommands, list[str]], str]:
-    """A verb that does this to the servos that its first word names."""
+    """A command that applies this change to the servos that its first argument names."""
 
-    def verb(verbs: FaultCommands, words: list[str]) -> str:
-        for servo in verbs.servos(words[0]):
+    def command(commands: FaultCommands, words: list[str]) -> str:
+        for servo in commands.servos(words[0]):
             change(servo, words[1:])
         return ""
 
-    return verb
+    return command
 
 
 def _block(servo: EmulatedServo, words: list[str]) -> None:
@@ -96,14 +97,14 @@ def _free(servo: EmulatedServo, words: list[str]) -> None:
     servo.blocked, servo.hand = False, None
 
 
-def _lead(verbs: FaultCommands, words: list[str]) -> str:
+def _lead(commands: FaultCommands, words: list[str]) -> str:
     degrees = _number(words[1])
-    if abs(degrees) > FARTHEST_DEG:
+    if abs(degrees) > MAX_LEAD_DEG:
         raise EmulatorError(
-            f"a joint is led to an angle of -{FARTHEST_DEG:g} to {FARTHEST_DEG:g} deg, found {words[1]}"
+            f"a joint can be led to an angle of -{MAX_LEAD_DEG:g} to {MAX_LEAD_DEG:g} deg, found {words[1]}"
         )
-    for servo in verbs.servos(words[0]):
-        servo.lead(verbs.pulses(servo, math.radians(degrees)))
+    for servo in commands.servos(words[0]):
+        servo.lead(commands.pulses(servo, math.radians(degrees)))
     return ""
 
 
@@ -122,7 +123,7 @@ def _reboot(servo: EmulatedServo, words: list[str]) -> None:
 def _baud(servo: EmulatedServo, words: list[str]) -> None:
     rate = _number(words[0])
     if rate not in BAUD_RATES:
-        raise EmulatorError(f"no servo has a baud rate of {words[0]}: {', '.join(map(str, BAUD_RATES))}")
+        raise EmulatorError(f"{words[0]} is not a baud rate of servos: {', '.join(map(str, BAUD_RATES))}")
     servo.memory["Baud Rate"] = BAUD_RATES.index(int(rate))
 
 
@@ -151,71 +152,73 @@ def _eeprom(servo: EmulatedServo, words: list[str]) -> None:
     servo.preset(" ".join(words[:-1]), int(value))
 
 
-def _voltage(verbs: FaultCommands, words: list[str]) -> str:
+def _voltage(commands: FaultCommands, words: list[str]) -> str:
     volts = _number(words[0])
     if not 0.0 <= volts <= 60.0:
-        raise EmulatorError(f"a supply has 0 to 60 V, found {words[0]}")
-    for servo in verbs.servos(words[1]) if len(words) > 1 else verbs.emulator.bus.servos:
+        raise EmulatorError(f"a supply voltage is 0 to 60 V, found {words[0]}")
+    for servo in commands.servos(words[1]) if len(words) > 1 else commands.emulator.bus.servos:
         servo.voltage = volts
     return ""
 
 
-def _duplicate(verbs: FaultCommands, words: list[str]) -> str:
-    like = verbs.servos(words[0])[0]
-    model = model_named(words[1]) if len(words) > 1 else like.model
-    verbs.emulator.bus.add(EmulatedServo(model, like.id, like.baud_rate, like.position + ELSEWHERE))
+def _duplicate(commands: FaultCommands, words: list[str]) -> str:
+    original = commands.servos(words[0])[0]
+    model = model_named(words[1]) if len(words) > 1 else original.model
+    commands.emulator.bus.add(
+        EmulatedServo(model, original.id, original.baud_rate, original.position + DUPLICATE_OFFSET)
+    )
     return ""
 
 
-def _delay(verbs: FaultCommands, words: list[str]) -> str:
-    return _faults(verbs, [f"delay_s={1e-3 * _number(words[0])}"])
+def _delay(commands: FaultCommands, words: list[str]) -> str:
+    return _faults(commands, [f"delay_s={1e-3 * _number(words[0])}"])
 
 
-def _faults(verbs: FaultCommands, words: list[str]) -> str:
-    """Those that are not named stay as they are; without any, none is left."""
+def _faults(commands: FaultCommands, words: list[str]) -> str:
+    """Sets the named faults and leaves the others; without arguments clears all."""
     known = {one.name: one.type for one in fields(WireFaults)}
-    values = asdict(verbs.emulator.faults) if words else {}
+    values = asdict(commands.emulator.faults) if words else {}
     for word in words:
         name, _, value = word.partition("=")
         if name not in known:
-            raise EmulatorError(f"no fault of the wire is called {name!r}; {nearest(name, known)}")
+            raise EmulatorError(f"unknown communication fault {name!r}; {suggestion(name, known)}")
         number = _number(value)
         values[name] = bool(number) if name == "echo" else int(number) if name == "seed" else number
-    verbs.emulator.faults = WireFaults(**values)
+    commands.emulator.faults = WireFaults(**values)
     return ""
 
 
-def _unplug(verbs: FaultCommands, words: list[str]) -> str:
-    verbs.emulator.unplug()
+def _unplug(commands: FaultCommands, words: list[str]) -> str:
+    commands.emulator.unplug()
     return ""
 
 
-def _plug_in(verbs: FaultCommands, words: list[str]) -> str:
-    verbs.emulator.plug_in()
-    return verbs.emulator.port
+def _plug_in(commands: FaultCommands, words: list[str]) -> str:
+    commands.emulator.plug_in()
+    return commands.emulator.port
 
 
-def _state(verbs: FaultCommands, words: list[str]) -> str:
-    """JSON: the port, each servo, and what the judge has counted."""
-    shown = ("Present Position", "Goal Position", "Torque Enable", "Hardware Error Status", "Bus Watchdog")
+def _state(commands: FaultCommands, words: list[str]) -> str:
+    """JSON with the port, the servos and the checker's counts."""
+    registers = ("Present Position", "Goal Position", "Torque Enable", "Hardware Error Status", "Bus Watchdog")
     servos = []
-    for servo in verbs.emulator.bus.servos:
+    for servo in commands.emulator.bus.servos:
         servo.present()
-        numbers = {name.lower().replace(" ", "_"): servo.memory[name] for name in shown}
-        about = {"id": servo.id, "model": servo.model.name, "powered": servo.powered, "blocked": servo.blocked}
-        about["led"] = servo.hand is not None
-        servos.append({**about, **numbers, "temperature": round(servo.temperature, 1), "voltage": servo.voltage})
-    judge = verbs.emulator.bus.judge
-    found = {"packets": judge.packets, "findings": dict(judge.counts)}
-    return json.dumps({"port": verbs.emulator.port, "servos": servos, "judge": found})
+        values = {name.lower().replace(" ", "_"): servo.memory[name] for name in registers}
+        status = {"id": servo.id, "model": servo.model.name, "powered": servo.powered, "blocked": servo.blocked}
+        status["led"] = servo.hand is not None
+        servos.append({**status, **values, "temperature": round(servo.temperature, 1), "voltage": servo.voltage})
+    checker = commands.emulator.bus.checker
+    counts = {"packets": checker.packets, "findings": dict(checker.counts)}
+    return json.dumps({"port": commands.emulator.port, "servos": servos, "judge": counts})
 
 
-def _findings(verbs: FaultCommands, words: list[str]) -> str:
-    """JSON: what the judge found, and forgets."""
-    judge = verbs.emulator.bus.judge
-    told = json.dumps([asdict(finding) for finding in judge.findings])
-    judge.findings.clear()
-    return told
+def _findings(commands: FaultCommands, words: list[str]) -> str:
+    """JSON with the checker's findings, which are then cleared."""
+    checker = commands.emulator.bus.checker
+    text = json.dumps([asdict(finding) for finding in checker.findings])
+    checker.findings.clear()
+    return text
 
 
 def _number(word: str) -> float:
@@ -228,7 +231,7 @@ def _number(word: str) -> float:
     return value
 
 
-VERBS: dict[str, tuple[str, Callable[[FaultCommands, list[str]], str]]] = {
+COMMANDS: dict[str, tuple[str, Callable[[FaultCommands, list[str]], str]]] = {
     "block": ("block JOINT", _each(_block)),
     "lead": ("lead JOINT DEGREES", _lead),
     "free": ("free JOINT", _each(_free)),
@@ -251,4 +254,4 @@ VERBS: dict[str, tuple[str, Callable[[FaultCommands, list[str]], str]]] = {
     "state": ("state", _state),
     "findings": ("findings", _findings),
 }
-"""How each is written, and what it does. JOINT and ID are the name of a joint or an id."""
+"""Syntax and implementation of each command. JOINT and ID are a joint name or a servo id."""

@@ -1,4 +1,4 @@
-"""What the servos of a chain move, one millisecond a step."""
+"""Interface to the mechanics that a chain of servos moves, in steps of one millisecond."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from dynamixel_emulator.motor import Effort
 
 
 class Mechanics(Protocol):
-    """What a chain of servos moves. Shafts are in the order of the chain, pulses from the zeros of their encoders."""
+    """Mechanics driven by a chain of servos. Shafts are in the order of the chain, pulses from the encoder zero."""
 
     def shafts(self) -> list[tuple[float, float]]:
-        """Where they are, and how fast they turn, pulses per second."""
+        """Position, pulses, and velocity, pulses per second, of each shaft."""
 
     def step(self, efforts: Sequence[Effort], blocked: Sequence[bool]) -> None:
-        """One millisecond with these efforts; something holds the blocked ones."""
+        """Advances one millisecond with these efforts; blocked shafts do not move."""
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,10 @@ class DrivenJoint:
     """A joint of a model and the servo that drives it.
 
     Attributes:
-        name: Of the joint, which is a hinge or a slide.
-        counts_per_rad: Pulses of the servo for one radian, or metre, of the joint; negative where they turn in opposite
-            directions. 4096 / (2 pi) without gears between them.
-        zero_counts: Pulses at which the joint is at 0.
+        name: Name of the joint, a hinge or a slide.
+        counts_per_rad: Pulses of the servo per radian, or metre, of the joint; negative if they turn in opposite
+            directions. 4096 / (2 pi) without a gear between them.
+        zero_counts: Pulses at joint position 0.
     """
 
     name: str

@@ -1,10 +1,10 @@
-"""Control tables of the servo models: address, initial value and allowed range of each number.
+"""Control tables of the servo models: address, initial value and allowed range of each register.
 
-Addresses and sizes are those of the tables that come with dynamixel-sdk, and of the e-Manual where these lack one.
+Addresses and sizes are from the tables in dynamixel-sdk, and from the e-Manual where these lack a register.
 Initial values, ranges and speeds are from the ROBOTIS e-Manual, pages "XM430-W350", "XM430-W210", "XL430-W250",
-"XL330-M288-T" and "XL330-M077-T"; speeds, torques and currents are those of their tables "Specifications" at the
-recommended voltage. Where an XL330 has its indirect data depends on its firmware, as in the SDK's `xl330_*.model` and
-`xl330_*_fw52.model`.
+"XL330-M288-T" and "XL330-M077-T"; speeds, torques and currents are from their tables "Specifications" at the
+recommended voltage. The address of an XL330's indirect data depends on its firmware, as in the SDK's `xl330_*.model`
+and `xl330_*_fw52.model`.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 
 from dynamixel_emulator.errors import EmulatorError
 
-RAM_BEGINS = 64
-"""Addresses below are stored without power, and locked while torque is on."""
+RAM_START = 64
+"""First address of the RAM area. Registers below (EEPROM) are non-volatile, and locked while torque is on."""
 FIRST_INDIRECT = 168
-"""From here on addresses and data of the indirect access; data below are registers."""
+"""First indirect address; ordinary registers are below."""
 PULSES_PER_TURN = 4096
 ANY = (None, None)
 
@@ -26,13 +26,13 @@ Range = tuple[int | None, int | None]
 
 @dataclass(frozen=True)
 class Register:
-    """One number of a control table.
+    """One register of a control table.
 
     Attributes:
-        name: As in the manual.
+        name: Name in the manual.
         address, size: Bytes.
-        initial: After a factory reset, or in RAM after a reboot.
-        allowed: Minimum and maximum value that may be written; None where it is not writable at all.
+        initial: Value after a factory reset, or in RAM after a reboot.
+        allowed: Minimum and maximum value that may be written; None if the register is read-only.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Register:
 
     @property
     def signed(self) -> bool:
-        """Whether its bytes may stand for a negative number."""
+        """Whether its value is a signed integer."""
         return self.name in SIGNED
 
     @property
@@ -54,7 +54,7 @@ class Register:
 
 @dataclass(frozen=True)
 class IndirectBlock:
-    """Addresses of two bytes each at which is written what the data behind them, one byte each, stand for."""
+    """A table of indirect addresses, two bytes each, and the indirect data that they map, one byte each."""
 
     addresses: int
     data: int
@@ -63,19 +63,21 @@ class IndirectBlock:
 
 @dataclass(frozen=True)
 class ServoModel:
-    """What all servos of a model have in common.
+    """Properties of a servo model.
 
     Attributes:
-        name: As in the SDK's file of the model. number: Model Number (0).
-        registers: By name.
-        modes: Values that Operating Mode (11) may take.
-        top_speed: Without load at the recommended voltage, rev/min.
-        voltage: Recommended, V.
-        stall_torque: Held still with full power at the recommended voltage, N m; so many `stall_amperes` then flow.
-        current_unit: Amperes of one unit of current; None for a model that reports load in 0.1 % of the stall torque.
-        firmware: Version that an emulated servo reports. Of an XL330 at most 52: above, ROBOTIS's tables contradict
-            each other. Bus watchdog and clear need 42 or above; fast reads, backup, Startup Configuration and torque
-            on by goal need 45, and 46 in an XL330.
+        name: Name of the model's file in the SDK.
+        number: Model Number (0).
+        registers: Registers by name.
+        modes: Valid values of Operating Mode (11).
+        top_speed: No-load speed at the recommended voltage, rev/min.
+        voltage: Recommended voltage, V.
+        stall_torque: Stall torque at the recommended voltage, N m.
+        stall_amperes: Stall current at the recommended voltage, A.
+        current_unit: Unit of the current registers, A; None for a model that reports load in 0.1 % of the stall torque.
+        firmware: Firmware version that an emulated servo reports. At most 52 for an XL330: above, ROBOTIS's tables
+            contradict each other. Bus watchdog and clear need 42 or above; fast reads, backup, Startup Configuration
+            and torque on by goal need 45, and 46 in an XL330.
     """
 
     name: str
@@ -91,14 +93,14 @@ class ServoModel:
 
     @property
     def indirect(self) -> tuple[IndirectBlock, ...]:
-        """Where a part of the table may be gathered."""
+        """Its blocks of indirect addresses and data."""
         if self.number not in XL330_NUMBERS:
             return X_BLOCKS
-        return XL330_BLOCKS if self.firmware >= XL330_MOVED else XL330_BLOCKS_BEFORE
+        return XL330_BLOCKS if self.firmware >= XL330_NEW_TABLE else XL330_OLD_BLOCKS
 
     @property
     def size(self) -> int:
-        """Bytes of the table."""
+        """Size of the table, bytes."""
         last = max(block.data + block.count for block in self.indirect)
         return max(last, *(one.address + one.size for one in self.registers.values()))
 
@@ -167,41 +169,41 @@ REGISTERS: dict[str, tuple[int, int] | tuple[int, int, int, Range]] = {
     "Present Temperature": (146, 1),
     "Backup Ready": (147, 1),
 }
-"""Address and size; of what can be written also initial value and range of XM430-W350. Other registers limit goals."""
-OF_XL330, OF_XL430 = {"PWM Slope"}, {"Present Load"}
-NOT_OF_XL430 = {"Current Limit", "Goal Current", "Present Current"}
+"""Address and size; for writable registers also initial value and range of XM430-W350. Other registers limit goals."""
+ONLY_XL330, ONLY_XL430 = {"PWM Slope"}, {"Present Load"}
+NOT_XL430 = {"Current Limit", "Goal Current", "Present Current"}
 
 ALL_MODES = frozenset({0, 1, 3, 4, 5, 16})
 X_BLOCKS = (IndirectBlock(168, 224, 28), IndirectBlock(578, 634, 28))
 XL330_NUMBERS = (1190, 1200)
-XL330_MOVED = 52
-"""Firmware from which on the indirect data of an XL330 are at 208 and no longer at 224."""
-XL330_BLOCKS, XL330_BLOCKS_BEFORE = (IndirectBlock(168, 208, 20),), (IndirectBlock(168, 224, 28),)
+XL330_NEW_TABLE = 52
+"""First firmware with the indirect data of an XL330 at 208 instead of 224."""
+XL330_BLOCKS, XL330_OLD_BLOCKS = (IndirectBlock(168, 208, 20),), (IndirectBlock(168, 224, 28),)
 
 
-def _registers(number: int, without: set[str], **others: tuple[int, Range]) -> dict[str, Register]:
-    """The table of a model; names of `others` are written with underscores for spaces."""
-    special = {name.replace("_", " "): value for name, value in others.items()}
+def _registers(number: int, without: set[str], **overrides: tuple[int, Range]) -> dict[str, Register]:
+    """The table of a model; names in `overrides` have underscores instead of spaces."""
+    changed = {name.replace("_", " "): value for name, value in overrides.items()}
     registers = {}
     for name, row in REGISTERS.items():
         if name not in without:
-            fact = special.get(name, (row[2], row[3]) if len(row) == 4 else (0, None))
-            registers[name] = Register(name, row[0], row[1], *fact)
+            values = changed.get(name, (row[2], row[3]) if len(row) == 4 else (0, None))
+            registers[name] = Register(name, row[0], row[1], *values)
     registers["Model Number"] = Register("Model Number", 0, 2, number)
     return registers
 
 
 XM430_W350 = ServoModel(
-    "xm430_w350", 1020, ALL_MODES, 46.0, 12.0, 4.1, 2.3, 0.00269, _registers(1020, OF_XL330 | OF_XL430)
+    "xm430_w350", 1020, ALL_MODES, 46.0, 12.0, 4.1, 2.3, 0.00269, _registers(1020, ONLY_XL330 | ONLY_XL430)
 )  # fmt: skip
 XM430_W210 = ServoModel(
     "xm430_w210", 1030, ALL_MODES, 77.0, 12.0, 3.0, 2.3, 0.00269,
-    _registers(1030, OF_XL330 | OF_XL430, Velocity_Limit=(330, (0, 1023))),
+    _registers(1030, ONLY_XL330 | ONLY_XL430, Velocity_Limit=(330, (0, 1023))),
 )  # fmt: skip
 XL430_W250 = ServoModel(
     "xl430_w250", 1060, ALL_MODES - {0, 5}, 57.0, 11.1, 1.4, 1.3, None,
     _registers(
-        1060, OF_XL330 | NOT_OF_XL430, Temperature_Limit=(72, (0, 100)),
+        1060, ONLY_XL330 | NOT_XL430, Temperature_Limit=(72, (0, 100)),
         Max_Voltage_Limit=(140, (60, 140)), Min_Voltage_Limit=(60, (60, 140)),
         Velocity_Limit=(265, (0, 1023)), Velocity_I_Gain=(1000, GAIN), Position_D_Gain=(4000, GAIN),
         Position_P_Gain=(640, GAIN),
@@ -215,14 +217,14 @@ XL330: dict[str, tuple[int, Range]] = {
 XL330_M288 = ServoModel(
     "xl330_m288", 1200, ALL_MODES, 103.0, 5.0, 0.52, 1.47, 0.001,
     _registers(
-        1200, OF_XL430, **XL330, Velocity_Limit=(445, (0, 2047)),
+        1200, ONLY_XL430, **XL330, Velocity_Limit=(445, (0, 2047)),
         Velocity_I_Gain=(1600, GAIN), Velocity_P_Gain=(180, GAIN),
     ),
 )  # fmt: skip
 XL330_M077 = ServoModel(
     "xl330_m077", 1190, ALL_MODES, 383.0, 5.0, 0.215, 1.47, 0.001,
     _registers(
-        1190, OF_XL430, **XL330, Velocity_Limit=(1620, (0, 2047)),
+        1190, ONLY_XL430, **XL330, Velocity_Limit=(1620, (0, 2047)),
         Velocity_I_Gain=(400, GAIN), Velocity_P_Gain=(40, GAIN),
         Position_I_Gain=(400, GAIN),
     ),
@@ -230,11 +232,11 @@ XL330_M077 = ServoModel(
 MODELS = {model.name: model for model in (XM430_W350, XM430_W210, XL430_W250, XL330_M288, XL330_M077)}
 
 BAUD_RATES = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
-"""By the value of Baud Rate (8)."""
+"""bit/s, indexed by the value of Baud Rate (8)."""
 
 
 def model_named(name: str) -> ServoModel:
-    """Raises EmulatorError for a model without a table here."""
+    """The model of this name. Raises EmulatorError for an unknown one."""
     if name not in MODELS:
         raise EmulatorError(f"servo model {name!r} is not known; known models: {', '.join(sorted(MODELS))}")
     return MODELS[name]

@@ -1,7 +1,7 @@
-"""The motor of an emulated servo: torque from voltage or current, and how warm it gets.
+"""Motor of an emulated servo: torque from voltage or current, and temperature.
 
-Torque falls linearly from the stall torque to nothing at the speed without load, and is proportional to the current.
-Gears are ideal; friction and the rotor's inertia are up to the mechanics.
+Torque falls linearly from the stall torque to 0 at the no-load speed, and is proportional to the current. Gears are
+ideal; the mechanics model friction and the rotor's inertia.
 """
 
 from __future__ import annotations
@@ -13,22 +13,23 @@ from dynamixel_emulator.models import PULSES_PER_TURN, ServoModel
 
 RAD_PER_PULSE = 2.0 * math.pi / PULSES_PER_TURN
 FULL_PWM = 885
-"""Of PWM registers: all of the voltage (e-Manual, "PWM Limit": 885 units of 0.113 %)."""
+"""Value of PWM registers for the full voltage (e-Manual, "PWM Limit": 885 units of 0.113 %)."""
 ROOM_TEMPERATURE = 30.0
-WARMING_AT_STALL = 150.0
-"""Degrees above the room that a servo held at its stall current would reach in the end; an estimate."""
-WARMING_S = 300.0
-"""In which 63 % of the way to that is done; an estimate."""
+STALL_TEMPERATURE_RISE = 150.0
+"""Steady-state temperature above room temperature at the stall current, degrees Celsius; an estimate."""
+THERMAL_TIME_CONSTANT_S = 300.0
+"""Time to 63 % of the steady-state rise; an estimate."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """What a servo does at its shaft during a step: a torque of `torque - damping * velocity`.
+    """Action of a servo on its shaft during a step: a torque of `torque - damping * velocity`.
 
-    Apart, so that whoever moves the shaft can take the second part at the velocity after the step, which is stable.
+    The two terms are separate so that the integrator can evaluate damping at the velocity after the step (implicit
+    integration), which is stable.
 
     Attributes:
-        torque: N m, positive towards growing positions.
+        torque: N m, positive towards increasing positions.
         damping: N m s/rad.
     """
 
@@ -36,15 +37,15 @@ class Effort:
     damping: float = 0.0
 
     def at(self, velocity: float) -> float:
-        """N m at this velocity, rad/s."""
+        """Torque at this velocity, rad/s; N m."""
         return self.torque - self.damping * velocity
 
 
-LIMP = Effort()
+NO_EFFORT = Effort()
 
 
 class Motor:
-    """Of one servo.
+    """Motor of one servo.
 
     Args:
         model: Its stall torque, speed and current.
@@ -56,28 +57,28 @@ class Motor:
     def __init__(self, model: ServoModel) -> None:
         self.model = model
         self.temperature = ROOM_TEMPERATURE
-        self.braking = model.stall_torque / (model.top_speed * 2.0 * math.pi / 60.0)
-        """Torque by the voltage that turning makes, N m s/rad."""
+        self.back_emf_damping = model.stall_torque / (model.top_speed * 2.0 * math.pi / 60.0)
+        """Damping by the back-EMF, N m s/rad."""
 
     def by_voltage(self, volts: float) -> Effort:
-        """With this voltage at the motor, V, either way."""
-        return Effort(self.model.stall_torque * volts / self.model.voltage, self.braking)
+        """Effort at this signed voltage at the motor, V."""
+        return Effort(self.model.stall_torque * volts / self.model.voltage, self.back_emf_damping)
 
-    def by_torque(self, wanted: Effort, velocity: float, volts: float) -> Effort:
-        """With a current for the wanted torque, as far as these volts, positive, drive it at this velocity, rad/s."""
+    def by_torque(self, requested: Effort, velocity: float, volts: float) -> Effort:
+        """Effort of current control at the requested torque, limited by this supply, V, at this velocity, rad/s."""
         maximum = self.by_voltage(volts)
         minimum = Effort(-maximum.torque, maximum.damping)
-        asked = wanted.at(velocity)
-        if asked > maximum.at(velocity):
+        torque = requested.at(velocity)
+        if torque > maximum.at(velocity):
             return maximum
-        return minimum if asked < minimum.at(velocity) else wanted
+        return minimum if torque < minimum.at(velocity) else requested
 
     def amperes(self, torque: float) -> float:
-        """Current that makes this torque, N m."""
+        """Current for this torque, N m; A."""
         return torque / self.model.stall_torque * self.model.stall_amperes
 
-    def warm(self, torque: float, during_s: float) -> None:
-        """By the square of the current; cools towards the room."""
+    def update_temperature(self, torque: float, duration_s: float) -> None:
+        """Heats with the square of the current, cools towards room temperature (first-order model)."""
         load = torque / self.model.stall_torque
-        rise = WARMING_AT_STALL * load * load - (self.temperature - ROOM_TEMPERATURE)
-        self.temperature += rise * during_s / WARMING_S
+        change = STALL_TEMPERATURE_RISE * load * load - (self.temperature - ROOM_TEMPERATURE)
+        self.temperature += change * duration_s / THERMAL_TIME_CONSTANT_S

@@ -1,8 +1,8 @@
 """Packets of Dynamixel servos as bytes: Protocol 2.0 (ROBOTIS e-Manual, "Protocol 2.0").
 
-A packet is FF FF FD 00, an id, the length of what follows, an instruction, parameters and a checksum. Within it
-FF FF FD is written FF FF FD FD ("byte stuffing"), so that this header begins packets only. No client
-shares this code, so that an error in a client's is found.
+A packet is FF FF FD 00, an id, the length of the rest, an instruction, parameters and a checksum. Inside a packet
+FF FF FD is sent as FF FF FD FD ("byte stuffing"), so that the header occurs only at the start of a packet. Clients do
+not share this code, so that the emulator detects errors in theirs.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from enum import IntEnum
 
 HEADER = b"\xff\xff\xfd"
 BEFORE_LENGTH = 5
-"""Header, a zero and the id."""
+"""Header, reserved byte 0 and id."""
 BEFORE_INSTRUCTION = BEFORE_LENGTH + 2
 BROADCAST = 254
 LONGEST_LENGTH = 1024
-"""Maximum of what follows the length; a larger one is noise. The SDK has the same maximum."""
+"""Maximum value of the length field; a larger one is treated as noise. The SDK has the same maximum."""
 POLYNOMIAL = 0x8005
 
 
 class Instruction(IntEnum):
-    """What a packet requests; `STATUS` is the reply."""
+    """Instruction of a packet; `STATUS` marks a reply."""
 
     PING = 0x01
     READ = 0x02
@@ -43,7 +43,7 @@ class Instruction(IntEnum):
 
 
 class StatusError(IntEnum):
-    """Error number of a status packet, its bits 0 to 6; bit 7 is `ALERT`."""
+    """Error number of a status packet, bits 0 to 6; bit 7 is `ALERT`."""
 
     NONE = 0
     RESULT_FAIL = 1
@@ -56,16 +56,16 @@ class StatusError(IntEnum):
 
 
 ALERT = 0x80
-"""Bit of the error: the servo's Hardware Error Status (70) is not 0."""
+"""Alert bit of the error byte: the servo's Hardware Error Status (70) is not 0."""
 
 
 @dataclass(frozen=True)
 class Packet:
-    """A packet without what the wire adds.
+    """The content of a packet, without header, length, stuffing and checksum.
 
     Attributes:
-        id: Of the servo that is asked or that replies, or `BROADCAST`.
-        instruction: One of `Instruction`, or a number that no servo knows.
+        id: The addressed or replying servo, or `BROADCAST`.
+        instruction: One of `Instruction`, or an unknown number.
         parameters: Without stuffing.
     """
 
@@ -76,7 +76,7 @@ class Packet:
 
 @dataclass(frozen=True)
 class DamagedPacket:
-    """A packet whose checksum is wrong; its id may be wrong too."""
+    """A packet with a wrong checksum; its id may be wrong too."""
 
     id: int
 
@@ -94,50 +94,50 @@ def _checksums() -> tuple[int, ...]:
 _CHECKSUMS = _checksums()
 
 
-def checksum(data: bytes, before: int = 0) -> int:
-    """CRC-16 with polynomial 0x8005, most significant bit first, from 0 or from the checksum of what came before."""
-    value = before
+def checksum(data: bytes, initial: int = 0) -> int:
+    """CRC-16, polynomial 0x8005, most significant bit first; starts at 0 or at the checksum of the preceding data."""
+    value = initial
     for byte in data:
         value = (value << 8) & 0xFFFF ^ _CHECKSUMS[value >> 8 ^ byte]
     return value
 
 
 def encoded(packet: Packet) -> bytes:
-    """The bytes on the wire."""
+    """Encodes a packet as the bytes on the wire."""
     content = bytes([packet.instruction, *packet.parameters]).replace(HEADER, HEADER + b"\xfd")
     data = HEADER + bytes([0, packet.id]) + (len(content) + 2).to_bytes(2, "little") + content
     return data + checksum(data).to_bytes(2, "little")
 
 
 def decoded(data: bytes) -> Packet:
-    """The packet of its bytes on the wire, from the header on; the checksum is not looked at."""
+    """Decodes a packet from its bytes on the wire, header included; does not verify the checksum."""
     content = data[BEFORE_INSTRUCTION:-2].replace(HEADER + b"\xfd", HEADER)
     return Packet(data[BEFORE_LENGTH - 1], content[0], content[1:])
 
 
 class PacketReader:
-    """Finds packets in received bytes, in pieces of any size; other bytes are skipped."""
+    """Extracts packets from received bytes, in chunks of any size; skips other bytes."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
 
     @property
-    def waits(self) -> bool:
-        """Whether the last bytes may be the beginning of a packet."""
+    def is_incomplete(self) -> bool:
+        """Whether the buffer holds the possible start of a packet."""
         return bool(self._bytes)
 
-    def forget(self) -> None:
-        """Drop the beginning of a packet whose rest did not come in time."""
+    def reset(self) -> None:
+        """Discards an incomplete packet, for example after a timeout."""
         self._bytes.clear()
 
     def feed(self, data: bytes) -> Iterator[Packet | DamagedPacket]:
-        """The packets that these bytes complete."""
+        """Yields the packets that these bytes complete."""
         self._bytes += data
         while (packet := self._next()) is not None:
             yield packet
 
     def _next(self) -> Packet | DamagedPacket | None:
-        while self._to_header():
+        while self._skip_to_header():
             size = BEFORE_INSTRUCTION + int.from_bytes(self._bytes[BEFORE_LENGTH:BEFORE_INSTRUCTION], "little")
             if not BEFORE_INSTRUCTION + 3 <= size <= BEFORE_INSTRUCTION + LONGEST_LENGTH:
                 del self._bytes[0]
@@ -146,23 +146,23 @@ class PacketReader:
                 return None
             data = bytes(self._bytes[:size])
             if checksum(data[:-2]) != int.from_bytes(data[-2:], "little"):
-                del self._bytes[: len(HEADER)]  # a packet may begin within what only seemed to be one
+                del self._bytes[: len(HEADER)]  # a packet may start inside this false one
                 return DamagedPacket(data[BEFORE_LENGTH - 1])
             del self._bytes[:size]
             return decoded(data)
         return None
 
-    def _to_header(self) -> bool:
-        """Drop the bytes before the next header; whether header, id and length are there."""
+    def _skip_to_header(self) -> bool:
+        """Drops the bytes before the next header; returns whether header, id and length have arrived."""
         while True:
             start = self._bytes.find(HEADER)
             if start < 0:
-                n_begun = next((n for n in (2, 1) if self._bytes.endswith(HEADER[:n])), 0)
-                del self._bytes[: len(self._bytes) - n_begun]
+                n_partial = next((n for n in (2, 1) if self._bytes.endswith(HEADER[:n])), 0)
+                del self._bytes[: len(self._bytes) - n_partial]
                 return False
             del self._bytes[:start]
             if len(self._bytes) < BEFORE_INSTRUCTION:
                 return False
-            if self._bytes[3] != 0xFD:  # else it is stuffed: not a header
+            if self._bytes[3] != 0xFD:  # otherwise stuffed data, not a header
                 return True
             del self._bytes[0]

@@ -1,7 +1,7 @@
-"""Judges what a program says to emulated servos: every byte, whether it is a packet, and whether it is one to be sent.
+"""Checks every byte that a program sends to emulated servos: packet format, and whether the content is safe and valid.
 
-Written apart from the packets' own code and from the servos, so that a mistake there is not repeated here. Servos
-refuse much of what is found here, but not all: they follow any goal within their limits, as fast as they can.
+Independent of the packet encoder and of the servos, so that an error there is not repeated here. Servos reject most of
+the findings, but not all: they follow any goal within their limits, as fast as they can.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from dynamixel_emulator.memory import POSITION_MODE
 from dynamixel_emulator.models import PULSES_PER_TURN
 from dynamixel_emulator.servo import EmulatedServo
 
-HEAD = b"\xff\xff\xfd"
-TO_ALL = 0xFE
+HEADER = b"\xff\xff\xfd"
+BROADCAST = 0xFE
 WRITES = {0x03, 0x04}
 SYNC_WRITE, BULK_WRITE = 0x83, 0x93
 KNOWN = {0x01, 0x02, *WRITES, 0x05, 0x06, 0x08, 0x10, 0x20, 0x82, SYNC_WRITE, 0x8A, 0x92, BULK_WRITE, 0x9A}
 RATE_WINDOW_S = 0.1
-"""After a longer silence the next step may not be larger than after this one."""
+"""Maximum time since the last goal that counts for the allowed size of the next step."""
 ROUNDING = 2.0
-"""Pulses by which a step may exceed what the rate allows."""
+"""Tolerance of the allowed step, pulses."""
 NEAR = 20.0
-"""Pulses by which the goal may be away from the servo when torque comes on."""
+"""Maximum distance from the goal when torque is switched on, pulses."""
 MAX_FINDINGS = 1000
 MAX_BYTES = 1024
 PULSES_PER_MINUTE_TO_SECOND = 4096 / 60
@@ -33,14 +33,14 @@ LOCKED_BELOW = 64
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that should not have been sent.
+    """An error of the client.
 
     Attributes:
-        time_s: When it came.
-        id: Of the servo that is meant; -1 where none is.
-        kind: A word: noise, incomplete, length, checksum, stuffing, instruction, register, eeprom, limit, step, torque,
+        time_s: Time of receipt, s.
+        id: The addressed servo; -1 without one.
+        kind: One of noise, incomplete, length, checksum, stuffing, instruction, register, eeprom, limit, step, torque,
             watchdog or shut_down.
-        detail: What was found and what would have been right.
+        detail: Message: the received data and what is valid.
     """
 
     time_s: float
@@ -50,213 +50,221 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class _Course:
+class _LastGoal:
     goal: float
     time_s: float
 
 
 class ProtocolChecker:
-    """Of all that arrives at some servos.
+    """Checks all bytes that a bus of servos receives.
 
     Args:
-        servos: Whose state decides what may be sent; a list that changes is followed.
-        fastest: Pulses per second that a stream of goals may ask of the servo of an id; without, what it can do without
-            load.
-        servo_rules_only: Whether only that is found which the servos themselves reject or cannot read; an arm's driver
-            should also keep goals from jumping, which the programs of others do all the time.
+        servos: Servos whose state determines what is valid; later changes of the list take effect.
+        max_speeds: Maximum speed of a stream of goals by servo id, pulses per second; otherwise the no-load speed.
+        servo_rules_only: Whether to report only packets that the servos themselves reject or cannot read. An arm's
+            driver must also avoid jumping goals, which are common in other programs.
 
     Attributes:
-        findings: The first thousand, in the order in which they came.
-        counts: How many of each kind.
-        packets: How many were sound.
+        findings: The first thousand findings, in order of receipt.
+        counts: Number of findings by kind.
+        packets: Number of valid packets.
     """
 
     def __init__(
         self,
         servos: Sequence[EmulatedServo],
-        fastest: Mapping[int, float] | None = None,
+        max_speeds: Mapping[int, float] | None = None,
         servo_rules_only: bool = False,
     ) -> None:
         self.servos, self.servo_rules_only = servos, servo_rules_only
-        self.fastest = dict(fastest or {})
+        self.max_speeds = dict(max_speeds or {})
         self.findings: list[Finding] = []
         self.counts: Counter[str] = Counter()
         self.packets = 0
         self._bytes = bytearray()
-        self._courses: dict[int, _Course] = {}
+        self._last_goals: dict[int, _LastGoal] = {}
         self._now_s = 0.0
 
     def pieces(self, data: bytes, now_s: float) -> Iterator[bytes]:
-        """The data cut after each packet, which is judged before it is handed out and obeyed."""
+        """Splits the data after each packet; each packet is checked before it is yielded for execution."""
         self._now_s = now_s
-        waiting = len(self._bytes)
+        buffered = len(self._bytes)
         self._bytes += data
-        handed = complete = 0
+        yielded = complete = 0
         for size in self._packets():
             complete += size
-            end = max(handed, complete - waiting)
-            yield data[handed:end]
-            handed = end
-        yield data[handed:]
+            end = max(yielded, complete - buffered)
+            yield data[yielded:end]
+            yielded = end
+        yield data[yielded:]
 
-    def give_up(self, now_s: float) -> None:
-        """The rest of a packet did not come in time."""
+    def discard_incomplete(self, now_s: float) -> None:
+        """Reports and discards an incomplete packet whose rest did not arrive in time."""
         self._now_s = now_s
         if self._bytes:
-            self._find("incomplete", f"{_hex(self._bytes)} and nothing more: a packet goes out in one piece")
+            self._report(
+                "incomplete", f"{_hex(self._bytes)} without the rest of the packet: a packet is sent without a pause"
+            )
             self._bytes.clear()
 
     # -- framing ----------------------------------------------------------------------------------------------------
 
     def _packets(self) -> Iterator[int]:
-        """Judges what is complete and drops it; tells each time how many bytes were dropped."""
+        """Checks and removes complete packets and noise; yields the number of bytes removed each time."""
         while self._bytes:
-            place = self._bytes.find(HEAD)
-            if place != 0:
-                kept = next((n for n in (2, 1) if self._bytes.endswith(HEAD[:n])), 0)
-                noise = place if place > 0 else len(self._bytes) - kept
+            start = self._bytes.find(HEADER)
+            if start != 0:
+                n_partial = next((n for n in (2, 1) if self._bytes.endswith(HEADER[:n])), 0)
+                noise = start if start > 0 else len(self._bytes) - n_partial
                 if noise == 0:
                     return
-                self._find("noise", f"{_hex(self._bytes[:noise])} before a header FF FF FD 00")
-                yield self._drop(noise)
+                self._report("noise", f"{_hex(self._bytes[:noise])} before a header FF FF FD 00")
+                yield self._remove(noise)
                 continue
             if len(self._bytes) < 7:
                 return
             size = 7 + int.from_bytes(self._bytes[5:7], "little")
             if size < 10 or size > 7 + MAX_BYTES or self._bytes[3] != 0:
-                self._find(
-                    "length", f"{_hex(self._bytes[:7])} begins no packet: a length of 3 to {MAX_BYTES} after 00 ID"
+                self._report(
+                    "length",
+                    f"{_hex(self._bytes[:7])} starts no packet: valid are 00, an ID and a length of 3 to {MAX_BYTES}",
                 )
-                yield self._drop(3)
+                yield self._remove(3)
                 continue
             if len(self._bytes) < size:
                 return
-            self._judge(bytes(self._bytes[:size]))
-            yield self._drop(size)
+            self._check(bytes(self._bytes[:size]))
+            yield self._remove(size)
 
-    def _drop(self, size: int) -> int:
+    def _remove(self, size: int) -> int:
         del self._bytes[:size]
         return size
 
-    def _judge(self, packet: bytes) -> None:
-        """Everything about one packet."""
+    def _check(self, packet: bytes) -> None:
+        """Checks one packet."""
         number, content = packet[4], packet[7:-2]
         if _crc(packet[:-2]) != packet[-2] + 256 * packet[-1]:
-            self._find(
+            self._report(
                 "checksum", f"{_hex(packet)} should end with {_hex(_crc(packet[:-2]).to_bytes(2, 'little'))}", number
             )
             return
         self.packets += 1
-        stuffed = HEAD + b"\xfd"
-        if HEAD in content.replace(stuffed, b""):
-            self._find("stuffing", f"{_hex(packet)} has FF FF FD within without another FD behind it", number)
-        plain = content.replace(stuffed, HEAD)
-        self._instruct(number, plain[0], plain[1:])
+        stuffed = HEADER + b"\xfd"
+        if HEADER in content.replace(stuffed, b""):
+            self._report("stuffing", f"{_hex(packet)} contains FF FF FD without a stuffed FD after it", number)
+        plain = content.replace(stuffed, HEADER)
+        self._check_instruction(number, plain[0], plain[1:])
 
     # -- content ----------------------------------------------------------------------------------------------------
 
-    def _instruct(self, number: int, instruction: int, words: bytes) -> None:
+    def _check_instruction(self, number: int, instruction: int, parameters: bytes) -> None:
         if instruction not in KNOWN:
-            self._find("instruction", f"no servo knows instruction {instruction:#04x}", number)
-        elif instruction in WRITES and len(words) < 3:
-            self._find("instruction", f"a write of {_hex(words)} has no data behind its address", number)
+            self._report("instruction", f"unknown instruction {instruction:#04x}", number)
+        elif instruction in WRITES and len(parameters) < 3:
+            self._report("instruction", f"write of {_hex(parameters)} has no data after its address", number)
         elif instruction in WRITES:
-            self._write(number, _word(words), words[2:])
+            self._check_write(number, _word(parameters), parameters[2:])
         elif instruction == SYNC_WRITE:
-            size = _word(words[2:]) + 1
-            if len(words) < 4 + size or size == 1 or (len(words) - 4) % size:
-                self._find("instruction", f"a sync write of {_hex(words)} is not of equal parts", number)
+            size = _word(parameters[2:]) + 1
+            if len(parameters) < 4 + size or size == 1 or (len(parameters) - 4) % size:
+                self._report(
+                    "instruction", f"sync write of {_hex(parameters)} does not have parts of equal length", number
+                )
                 return
-            for at in range(4, len(words), size):
-                self._write(words[at], _word(words), words[at + 1 : at + size])
+            for at in range(4, len(parameters), size):
+                self._check_write(parameters[at], _word(parameters), parameters[at + 1 : at + size])
         elif instruction == BULK_WRITE:
             at = 0
-            while at < len(words):
-                end = at + 5 + _word(words[at + 3 :])
-                if end > len(words) or end == at + 5:
-                    self._find("instruction", f"a bulk write of {_hex(words)} ends within a part", number)
+            while at < len(parameters):
+                end = at + 5 + _word(parameters[at + 3 :])
+                if end > len(parameters) or end == at + 5:
+                    self._report("instruction", f"bulk write of {_hex(parameters)} ends inside a part", number)
                     return
-                self._write(words[at], _word(words[at + 1 :]), words[at + 5 : end])
+                self._check_write(parameters[at], _word(parameters[at + 1 :]), parameters[at + 5 : end])
                 at = end
 
-    def _write(self, number: int, address: int, data: bytes) -> None:
+    def _check_write(self, number: int, address: int, data: bytes) -> None:
         for servo in self.servos:
-            if number in (servo.id, TO_ALL) and servo.listens:
-                for name, value in self._registers(servo, address, data):
-                    self._register(servo, name, value)
+            if number in (servo.id, BROADCAST) and servo.listens:
+                for name, value in self._written_registers(servo, address, data):
+                    self._check_register(servo, name, value)
 
-    def _registers(self, servo: EmulatedServo, address: int, data: bytes) -> Iterator[tuple[str, int]]:
-        """Those that these bytes cover; indirect data are of the register for which they stand."""
+    def _written_registers(self, servo: EmulatedServo, address: int, data: bytes) -> Iterator[tuple[str, int]]:
+        """Registers and values that these bytes write; indirect data count for the register that they are mapped to."""
         end = min(block.addresses for block in servo.model.indirect)
-        written = {meant: byte for i, byte in enumerate(data) if (meant := _meant(servo, address + i)) < end}
+        written = {target: byte for i, byte in enumerate(data) if (target := _resolved(servo, address + i)) < end}
         covered = 0
         for one in servo.model.registers.values():
-            places = range(one.address, one.address + one.size)
-            part = bytes(written[place] for place in places if place in written)
+            addresses = range(one.address, one.address + one.size)
+            part = bytes(written[at] for at in addresses if at in written)
             covered += len(part)
             if part and len(part) < one.size:
-                self._find("register", f"{len(data)} bytes at {address} are only a part of {one.name}", servo.id)
+                self._report("register", f"{len(data)} bytes at {address} cover only a part of {one.name}", servo.id)
             elif part and one.allowed is None:
-                self._find("register", f"{one.name} can only be read", servo.id)
+                self._report("register", f"{one.name} is read-only", servo.id)
             elif part:
                 yield one.name, int.from_bytes(part, "little", signed=one.signed)
         if covered < len(written):
-            self._find("register", f"{len(data)} bytes at {address}: not all of them belong to a register", servo.id)
+            self._report("register", f"{len(data)} bytes at {address}: not all of them are in a register", servo.id)
 
-    def _register(self, servo: EmulatedServo, name: str, value: int) -> None:
+    def _check_register(self, servo: EmulatedServo, name: str, value: int) -> None:
         memory = servo.memory
         if servo.model.registers[name].address < LOCKED_BELOW and memory["Torque Enable"]:
-            self._find("eeprom", f"{name} is written while torque is on", servo.id)
+            self._report("eeprom", f"{name} was written while torque is on", servo.id)
         if name == "Torque Enable":
-            self._torque(servo, value)
+            self._check_torque(servo, value)
         limits = {
             "Goal PWM": "PWM Limit", "Goal Current": "Current Limit", "Goal Velocity": "Velocity Limit",
         }  # fmt: skip
         if name in limits and abs(value) > memory[limits[name]]:
-            self._find("limit", f"{name} {value} is beyond {limits[name]} {memory[limits[name]]}", servo.id)
+            self._report("limit", f"{name} {value} exceeds {limits[name]} {memory[limits[name]]}", servo.id)
         if name.startswith("Goal") and memory["Bus Watchdog"] == 255:
-            self._find("watchdog", f"{name} is written although Bus Watchdog tripped: first write 0 to it", servo.id)
+            self._report(
+                "watchdog",
+                f"{name} was written after Bus Watchdog had tripped: first write 0 to Bus Watchdog",
+                servo.id,
+            )
         if name == "Goal Position":
-            self._goal(servo, value)
+            self._check_goal(servo, value)
 
-    def _torque(self, servo: EmulatedServo, value: int) -> None:
+    def _check_torque(self, servo: EmulatedServo, value: int) -> None:
         memory = servo.memory
-        self._courses.pop(servo.id, None)
+        self._last_goals.pop(servo.id, None)
         if not value or memory["Torque Enable"]:
             return
         position = servo.position % PULSES_PER_TURN if memory["Operating Mode"] == POSITION_MODE else servo.position
-        away = memory["Goal Position"] - memory.homing - position
-        if not self.servo_rules_only and memory["Operating Mode"] in (3, 4, 5) and abs(away) > NEAR:
-            self._find(
+        distance = memory["Goal Position"] - memory.homing - position
+        if not self.servo_rules_only and memory["Operating Mode"] in (3, 4, 5) and abs(distance) > NEAR:
+            self._report(
                 "torque",
-                f"torque comes on with the goal {away:.0f} pulses away: first write Present Position",
+                f"torque was switched on with the goal {distance:.0f} pulses away: first write Present Position to it",
                 servo.id,
             )
         error = memory["Hardware Error Status"]
         if servo.is_shut_down or (error and not self.servo_rules_only):
-            self._find("shut_down", f"torque comes on although Hardware Error Status is {error:#04x}", servo.id)
+            self._report("shut_down", f"torque was switched on while Hardware Error Status is {error:#04x}", servo.id)
 
-    def _goal(self, servo: EmulatedServo, goal: int) -> None:
+    def _check_goal(self, servo: EmulatedServo, goal: int) -> None:
         memory = servo.memory
         low, high = memory["Min Position Limit"], memory["Max Position Limit"]
         if memory["Operating Mode"] == 3 and not low <= goal <= high:
-            self._find("limit", f"Goal Position {goal} is outside of {low} to {high}", servo.id)
+            self._report("limit", f"Goal Position {goal} is outside of {low} to {high}", servo.id)
         if self.servo_rules_only or not memory["Torque Enable"]:
             return
-        present = _Course(servo.position + memory.homing, -RATE_WINDOW_S)
-        last = self._courses.get(servo.id, present)
+        present = _LastGoal(servo.position + memory.homing, -RATE_WINDOW_S)
+        last = self._last_goals.get(servo.id, present)
         elapsed_s = min(RATE_WINDOW_S, self._now_s - last.time_s)
-        fastest = self.fastest.get(servo.id, servo.model.top_speed * PULSES_PER_MINUTE_TO_SECOND)
-        step, allowed = abs(goal - last.goal), fastest * elapsed_s + ROUNDING
+        max_speed = self.max_speeds.get(servo.id, servo.model.top_speed * PULSES_PER_MINUTE_TO_SECOND)
+        step, allowed = abs(goal - last.goal), max_speed * elapsed_s + ROUNDING
         if step > allowed:
             detail = (
                 f"Goal Position goes from {last.goal:.0f} to {goal} within {1e3 * elapsed_s:.0f} ms: "
-                f"{fastest:.0f} pulses/s allow {allowed:.0f} of these {step:.0f}"
+                f"{max_speed:.0f} pulses/s allow {allowed:.0f} of these {step:.0f}"
             )
-            self._find("step", detail, servo.id)
-        self._courses[servo.id] = _Course(goal, self._now_s)
+            self._report("step", detail, servo.id)
+        self._last_goals[servo.id] = _LastGoal(goal, self._now_s)
 
-    def _find(self, kind: str, detail: str, number: int = -1) -> None:
+    def _report(self, kind: str, detail: str, number: int = -1) -> None:
         self.counts[kind] += 1
         if len(self.findings) < MAX_FINDINGS:
             self.findings.append(Finding(self._now_s, number, kind, detail))
@@ -266,16 +274,16 @@ def _word(data: bytes) -> int:
     return int.from_bytes(data[:2], "little")
 
 
-def _meant(servo: EmulatedServo, place: int) -> int:
-    """Address at which a byte has its effect, if it is one of the indirect data."""
+def _resolved(servo: EmulatedServo, address: int) -> int:
+    """Resolves the address of indirect data to the address that it is mapped to; returns any other unchanged."""
     for block in servo.model.indirect:
-        if block.data <= place < block.data + block.count:
-            return _word(servo.memory.read(block.addresses + 2 * (place - block.data), 2))
-    return place
+        if block.data <= address < block.data + block.count:
+            return _word(servo.memory.read(block.addresses + 2 * (address - block.data), 2))
+    return address
 
 
 def _crc(data: bytes) -> int:
-    """CRC-16 of polynomial x^16 + x^15 + x^2 + 1 from 0, bit by bit."""
+    """CRC-16 with polynomial x^16 + x^15 + x^2 + 1, initial value 0, bit by bit."""
     remainder = 0
     for byte in data:
         remainder ^= byte << 8
@@ -285,5 +293,5 @@ def _crc(data: bytes) -> int:
 
 
 def _hex(data: bytes | bytearray) -> str:
-    shown = bytes(data[:24]).hex(" ").upper()
-    return f"{shown} ... ({len(data)} bytes)" if len(data) > 24 else shown
+    text = bytes(data[:24]).hex(" ").upper()
+    return f"{text} ... ({len(data)} bytes)" if len(data) > 24 else text

@@ -1,4 +1,4 @@
-"""One Dynamixel servo: answers to instructions, and does what they ask for."""
+"""One Dynamixel servo: executes instructions and replies."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from dataclasses import dataclass
 from dynamixel_emulator.body import REVERSE, ServoBody
 from dynamixel_emulator.loops import VELOCITY_UNIT
 from dynamixel_emulator.memory import GOALS, POSITION_MODE, RejectedError
-from dynamixel_emulator.models import BAUD_RATES, PULSES_PER_TURN, RAM_BEGINS, ServoModel, model_named
+from dynamixel_emulator.models import BAUD_RATES, PULSES_PER_TURN, RAM_START, ServoModel, model_named
 from dynamixel_emulator.packets import ALERT, Instruction, StatusError
 
 REBOOT_S = 0.3
-"""So long a servo that reboots hears nothing; assumed."""
+"""Time of a reboot, during which a servo receives nothing; assumed."""
 CLEAR_MULTI_TURN = bytes([0x01, 0x44, 0x58, 0x4C, 0x22])
 STORE, RESTORE = bytes([0x01, 0x43, 0x54, 0x52, 0x4C]), bytes([0x02, 0x43, 0x54, 0x52, 0x4C])
 STARTS_WITH_TORQUE, STARTS_WITH_BACKUP = 0x01, 0x02
 """Bits of Startup Configuration (60)."""
 RATE_MARGIN = 0.03
-"""Part by which a baud rate may differ (e-Manual, "Baud Rate")."""
+"""Tolerated relative error of a baud rate (e-Manual, "Baud Rate")."""
 RESET_ALL, KEEP_ID, KEEP_ID_AND_BAUD = 0xFF, 0x01, 0x02
-KEPT = {RESET_ALL: (), KEEP_ID: ("ID",), KEEP_ID_AND_BAUD: ("ID", "Baud Rate")}
+PRESERVED = {RESET_ALL: (), KEEP_ID: ("ID",), KEEP_ID_AND_BAUD: ("ID", "Baud Rate")}
 TORQUE_ON_BY_GOAL = 0x08
 """Bit of Drive Mode (10)."""
 
 
 @dataclass(frozen=True)
-class Answer:
-    """Error, alert included, and data of a status packet."""
+class Reply:
+    """Error byte, alert bit included, and data of a status packet."""
 
     error: int
     data: bytes = b""
@@ -36,10 +36,10 @@ class EmulatedServo(ServoBody):
     """A servo on a bus.
 
     Args:
-        model: Its name, one of `MODELS`, or a model of one's own.
+        model: Name of one of `MODELS`, or a custom model.
         number: Its ID.
-        baud_rate: At which it listens, bit/s.
-        position: In which it stands, pulses.
+        baud_rate: Its baud rate, bit/s.
+        position: Initial position, pulses.
     """
 
     def __init__(
@@ -51,39 +51,39 @@ class EmulatedServo(ServoBody):
 
     @property
     def id(self) -> int:
-        """On the bus."""
+        """Its ID on the bus."""
         return self.memory["ID"]
 
     @property
     def baud_rate(self) -> int:
-        """At which it listens, bit/s."""
+        """Its baud rate, bit/s."""
         return BAUD_RATES[self.memory["Baud Rate"]]
 
-    def hears_at(self, baud_rate: int) -> bool:
-        """Whether what is said at this rate, bit/s, can be understood."""
+    def listens_at(self, baud_rate: int) -> bool:
+        """Whether it can receive packets at this rate, bit/s."""
         return abs(baud_rate - self.baud_rate) < RATE_MARGIN * self.baud_rate
 
     @property
     def return_delay_s(self) -> float:
-        """Between an instruction and the answer."""
+        """Delay between an instruction and the reply."""
         return 2e-6 * self.memory["Return Delay Time"]
 
-    def answers(self, instruction: int) -> bool:
-        """Whether Status Return Level (68) lets it answer; to a ping it always does."""
+    def replies_to(self, instruction: int) -> bool:
+        """Whether Status Return Level (68) allows a reply to this instruction; always true for a ping."""
         reads = {Instruction.READ, Instruction.SYNC_READ, Instruction.BULK_READ}
         reads |= {Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ}
-        needed = 0 if instruction == Instruction.PING else 1 if instruction in reads else 2
-        return self.memory["Status Return Level"] >= needed
+        level = 0 if instruction == Instruction.PING else 1 if instruction in reads else 2
+        return self.memory["Status Return Level"] >= level
 
-    def do(self, instruction: int, parameters: bytes = b"") -> Answer:
-        """Follow an instruction for this servo alone."""
-        alert = ALERT if self.memory["Hardware Error Status"] else 0  # also in the last answer before a reboot
+    def do(self, instruction: int, parameters: bytes = b"") -> Reply:
+        """Executes an instruction to this servo."""
+        alert = ALERT if self.memory["Hardware Error Status"] else 0  # also in the last reply before a reboot
         try:
-            return Answer(alert, self._done(instruction, parameters))
+            return Reply(alert, self._executed(instruction, parameters))
         except RejectedError as rejected:
-            return Answer(alert | rejected.error)
+            return Reply(alert | rejected.error)
 
-    def _done(self, instruction: int, parameters: bytes) -> bytes:
+    def _executed(self, instruction: int, parameters: bytes) -> bytes:
         if instruction == Instruction.PING:
             return self.memory["Model Number"].to_bytes(2, "little") + bytes([self.memory["Firmware Version"]])
         if instruction == Instruction.READ:
@@ -124,48 +124,48 @@ class EmulatedServo(ServoBody):
         if self.is_shut_down and any(
             register.name == "Torque Enable" and value for register, value in self.memory.check(address, data)
         ):
-            raise RejectedError(StatusError.RESULT_FAIL)  # which number it is, the manual does not tell
+            raise RejectedError(StatusError.RESULT_FAIL)  # assumed: the manual does not specify the error number
         written = self.memory.write(address, data)
         memory = self.memory
         if (memory["Drive Mode"] ^ before["Drive Mode"]) & REVERSE:
             self.position, self.velocity = -self.position, -self.velocity
-            self._settle()
+            self._reset_position()
         if memory["Operating Mode"] != before["Operating Mode"]:
-            memory.retune()
-            self._settle()
+            memory.reset_gains()
+            self._reset_position()
         goal = GOALS[memory["Operating Mode"]]
         if goal in written and memory["Drive Mode"] & TORQUE_ON_BY_GOAL and not self.is_shut_down:
             memory["Torque Enable"] = 1
         if memory["Torque Enable"] > before["Torque Enable"]:
             if memory["Operating Mode"] == POSITION_MODE:
                 self.position %= PULSES_PER_TURN
-            self.loops.begin(self.position)
+            self.loops.reset(self.position)
         if memory["Bus Watchdog"] != before["Bus Watchdog"]:
-            self._heard_s = self._now_s
+            self._received_s = self._now_s
         if goal in written or "Torque Enable" in written:
             self.loops.plan()
 
     def reboot(self) -> None:
-        """As after switching on: RAM is initial, goals where the servo stands, within one turn; torque is off.
+        """Restarts as after power-on: RAM is reset, the goal is the present position within one turn, torque is off.
 
-        Startup Configuration (60) may want torque on, and gains and profile of the backup.
+        Startup Configuration (60) can switch torque on, and restore gains and profile from the backup.
         """
         startup = self.memory["Startup Configuration"]
-        self.memory.reset(RAM_BEGINS)
+        self.memory.reset(RAM_START)
         if startup & STARTS_WITH_BACKUP:
             self.memory.restore_ram()
         self._registered, self._overloaded_s, self.torque = None, 0.0, 0.0
-        self._booted_s, self._deaf_until_s = self._now_s, self._now_s + REBOOT_S
-        self._settle()
+        self._booted_s, self._rebooting_until_s = self._now_s, self._now_s + REBOOT_S
+        self._reset_position()
         self.memory["Torque Enable"] = startup & STARTS_WITH_TORQUE
         self.loops.plan()
 
     def _factory_reset(self, parameters: bytes) -> None:
-        if len(parameters) != 1 or parameters[0] not in KEPT:
+        if len(parameters) != 1 or parameters[0] not in PRESERVED:
             raise RejectedError(StatusError.DATA_RANGE)
-        kept = {name: self.memory[name] for name in KEPT[parameters[0]]}
+        preserved = {name: self.memory[name] for name in PRESERVED[parameters[0]]}
         self.memory.reset(0)
-        for name, value in kept.items():
+        for name, value in preserved.items():
             self.memory[name] = value
         self.reboot()
 
@@ -186,7 +186,7 @@ class EmulatedServo(ServoBody):
             raise RejectedError(StatusError.DATA_RANGE)
         if round(self.velocity / VELOCITY_UNIT) != 0:
             raise RejectedError(StatusError.RESULT_FAIL)
-        self._settle()
+        self._reset_position()
 
 
 def _word(data: bytes) -> int:

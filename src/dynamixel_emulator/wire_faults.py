@@ -1,4 +1,4 @@
-"""What goes wrong on the wire, on purpose: answers that are lost, late, cut, damaged or from another servo."""
+"""Injected communication faults: replies that are lost, late, cut, damaged or from another servo."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ import numpy as np
 from dynamixel_emulator.errors import EmulatorError
 from dynamixel_emulator.packets import decoded, encoded
 
-LONGEST_NOISE = 12
+MAX_NOISE_BYTES = 12
 UNUSED_ID = 253
-"""Servos have lower ones."""
+"""IDs of servos are lower."""
 
 
 @dataclass
 class WireFaults:
-    """Shares of the answers, 0 to 1, to which something happens; nothing does by default.
+    """Fractions of the replies, 0 to 1, that each fault affects; none by default.
 
     Attributes:
-        lost: Never comes.
-        damaged: One byte is another, so that the checksum is wrong.
-        cut: Its second half never comes.
-        noisy: Has bytes before it that mean nothing.
-        bare: Has no data, with a right checksum.
-        foreign: Names another servo, with a right checksum.
-        late: Comes `late_s` later, which may be after the next question.
-        late_s: s.
-        delay_s: By which every answer comes later, as by an adapter that keeps bytes back.
-        echo: Whether the client hears itself, as with an adapter of two wires.
-        seed: Of what happens to which answer.
+        lost: The reply never arrives.
+        damaged: One byte is changed, so that the checksum is wrong.
+        cut: The second half never arrives.
+        noisy: Random bytes precede the reply.
+        bare: The reply has no data, with a correct checksum.
+        foreign: The reply has the ID of another servo, with a correct checksum.
+        late: The reply arrives `late_s` later, possibly after the next request.
+        late_s: Delay of late replies, s.
+        delay_s: Additional delay of every reply, s, as by an adapter that buffers bytes.
+        echo: Whether the client receives its own bytes, as with a half-duplex adapter.
+        seed: Seed of the random faults.
     """
 
     lost: float = 0.0
@@ -45,7 +45,7 @@ class WireFaults:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Raises EmulatorError for a fraction beyond 0 to 1 or a time that is negative."""
+        """Raises EmulatorError for a fraction outside of 0 to 1 or a negative time."""
         for one in fields(self):
             value = getattr(self, one.name)
             if one.name not in ("late_s", "delay_s", "echo", "seed") and not 0.0 <= value <= 1.0:
@@ -55,32 +55,32 @@ class WireFaults:
                 raise EmulatorError(f"{name} is finite and not negative, found {getattr(self, name)}")
         self._rng = np.random.default_rng(self.seed)
 
-    def told(self, question: bytes, answers: list[tuple[float, bytes]]) -> list[tuple[float, bytes]]:
-        """What the client gets instead of these answers: delays, s, and bytes."""
-        kept, held_back_s = ([(0.0, question)] if self.echo else []), self.delay_s
-        for delay_s, answer in answers:
-            if self._happens(self.lost):
+    def apply(self, request: bytes, replies: list[tuple[float, bytes]]) -> list[tuple[float, bytes]]:
+        """Applies the faults to these replies; returns delays, s, and bytes as the client receives them."""
+        received, buffer_delay_s = ([(0.0, request)] if self.echo else []), self.delay_s
+        for delay_s, reply in replies:
+            if self._occurs(self.lost):
                 continue
-            late_s = self.late_s if self._happens(self.late) else 0.0
-            kept.append((delay_s + late_s + held_back_s, self._changed(answer)))
-            held_back_s = 0.0  # the others come right behind the first
-        return kept
+            late_s = self.late_s if self._occurs(self.late) else 0.0
+            received.append((delay_s + late_s + buffer_delay_s, self._changed(reply)))
+            buffer_delay_s = 0.0  # the others follow the first without delay
+        return received
 
-    def _changed(self, answer: bytes) -> bytes:
-        if self._happens(self.bare):
-            packet = decoded(answer)
-            answer = encoded(replace(packet, parameters=packet.parameters[:1]))
-        if self._happens(self.foreign):
-            packet = decoded(answer)
-            answer = encoded(replace(packet, id=(packet.id + 1) % UNUSED_ID))
-        if self._happens(self.damaged):
-            place = int(self._rng.integers(len(answer)))
-            answer = answer[:place] + bytes([answer[place] ^ int(self._rng.integers(1, 256))]) + answer[place + 1 :]
-        if self._happens(self.cut):
-            answer = answer[: len(answer) // 2]
-        if self._happens(self.noisy):
-            answer = self._rng.bytes(int(self._rng.integers(1, LONGEST_NOISE))) + answer
-        return answer
+    def _changed(self, reply: bytes) -> bytes:
+        if self._occurs(self.bare):
+            packet = decoded(reply)
+            reply = encoded(replace(packet, parameters=packet.parameters[:1]))
+        if self._occurs(self.foreign):
+            packet = decoded(reply)
+            reply = encoded(replace(packet, id=(packet.id + 1) % UNUSED_ID))
+        if self._occurs(self.damaged):
+            index = int(self._rng.integers(len(reply)))
+            reply = reply[:index] + bytes([reply[index] ^ int(self._rng.integers(1, 256))]) + reply[index + 1 :]
+        if self._occurs(self.cut):
+            reply = reply[: len(reply) // 2]
+        if self._occurs(self.noisy):
+            reply = self._rng.bytes(int(self._rng.integers(1, MAX_NOISE_BYTES))) + reply
+        return reply
 
-    def _happens(self, share: float) -> bool:
-        return share > 0.0 and bool(self._rng.random() < share)
+    def _occurs(self, fraction: float) -> bool:
+        return fraction > 0.0 and bool(self._rng.random() < fraction)

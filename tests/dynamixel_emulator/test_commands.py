@@ -1,4 +1,4 @@
-"""The command line, as someone uses it who has never heard of paramove."""
+"""The command line, used without paramove."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ TORQUE_ENABLE, GOAL_POSITION = 64, 116
 
 
 @contextmanager
-def emulator(*arguments: str, ends_by: int = signal.SIGINT) -> Iterator[None]:
+def emulator(*arguments: str, stop_signal: int = signal.SIGINT) -> Iterator[None]:
     with subprocess.Popen([*COMMAND, *arguments], stdout=subprocess.PIPE, text=True) as running:
         assert running.stdout is not None
         assert "Ctrl-C" in running.stdout.readline()
         yield
-        running.send_signal(ends_by)
+        running.send_signal(stop_signal)
         assert running.wait(20) == 0
 
 
@@ -37,7 +37,7 @@ def run(*arguments: str) -> str:
     return done.stdout
 
 
-def test_an_arm_by_its_name_answers_to_the_sdk_and_has_the_faults_that_are_requested(tmp_path: Path) -> None:
+def test_an_arm_by_name_replies_to_the_sdk_and_has_the_injected_faults(tmp_path: Path) -> None:
     link = tmp_path / "koch-port"
     with emulator("koch", "--port", str(link)):
         port, packets = PortHandler(str(link)), PacketHandler(2.0)
@@ -53,8 +53,8 @@ def test_an_arm_by_its_name_answers_to_the_sdk_and_has_the_faults_that_are_reque
         assert [one["torque_enable"] for one in state["servos"]] == [0, 0, 1, 0, 0, 0]
         assert state["servos"][2]["goal_position"] == 2100
         assert run("fault", "overload", "elbow_flex", "--port", str(link)) == ""
-        shown = [line.split() for line in run("status", "--port", str(link)).splitlines()]
-        (elbow,) = (words for words in shown if words[:2] == ["3", "xl330_m288"])
+        rows = [line.split() for line in run("status", "--port", str(link)).splitlines()]
+        (elbow,) = (words for words in rows if words[:2] == ["3", "xl330_m288"])
         assert elbow[4:6] == ["off", "32"]
         port.closePort()
         run("fault", "unplug", "--port", str(link))
@@ -64,10 +64,10 @@ def test_an_arm_by_its_name_answers_to_the_sdk_and_has_the_faults_that_are_reque
     assert not control_of(link).exists()
 
 
-def test_any_servos_at_any_rate_and_a_world(tmp_path: Path) -> None:
+def test_servos_by_model_and_id_a_baud_rate_and_a_world(tmp_path: Path) -> None:
     link, world = tmp_path / "port", Path(__file__).parents[2] / "robot_description" / "koch_v1_1" / "scene.xml"
     servos = ("xl430_w250:7", "xm430_w210:8")
-    with emulator(*servos, "--port", str(link), "--baud-rate", "57600", ends_by=signal.SIGTERM):
+    with emulator(*servos, "--port", str(link), "--baud-rate", "57600", stop_signal=signal.SIGTERM):
         port, packets = PortHandler(str(link)), PacketHandler(2.0)
         assert port.openPort()
         assert port.setBaudRate(57600)
@@ -90,7 +90,7 @@ def test_any_servos_at_any_rate_and_a_world(tmp_path: Path) -> None:
         (("status",), MISSING, ("dynamixel-port.control",)),
     ],
 )
-def test_what_cannot_be_done_ends_with_what_would_work(
+def test_an_error_message_names_what_is_valid(
     arguments: tuple[str, ...],
     code: int,
     facts: tuple[str, ...],
@@ -100,22 +100,20 @@ def test_what_cannot_be_done_ends_with_what_would_work(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == code
-    said = capsys.readouterr().err
+    message = capsys.readouterr().err
     for fact in facts:
-        assert fact in said
+        assert fact in message
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_fault_that_does_not_exist_is_rejected_with_the_nearest(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_unknown_fault_is_rejected_with_a_suggestion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     link = tmp_path / "port"
     with emulator("koch", "--port", str(link)):
         assert main(("fault", "unplugg", "--port", str(link))) == UNUSABLE
         assert "'unplug'" in capsys.readouterr().err
 
 
-def test_it_imports_nothing_of_paramove_and_mujoco_only_for_a_world() -> None:
+def test_it_does_not_import_paramove_and_imports_mujoco_only_for_a_world() -> None:
     program = "import sys; import dynamixel_emulator.commands; print(*{name.split('.')[0] for name in sys.modules})"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert {"paramove", "sim", "mujoco"}.isdisjoint(done.stdout.split())

@@ -1,4 +1,4 @@
-"""The control socket: one line, one answer; its file is the user's own and no other one is touched."""
+"""The control socket: one reply per line; only the user can open it, and it replaces no other file."""
 
 import contextlib
 import socket
@@ -15,16 +15,16 @@ from dynamixel_emulator.servo import EmulatedServo
 
 def echoed(line):
     if line == "bad":
-        raise EmulatorError("that is bad: say good")
+        raise EmulatorError("unknown word: send good")
     return line.upper()
 
 
-def test_a_line_is_answered_and_the_socket_is_gone_afterwards(tmp_path):
+def test_each_line_gets_a_reply_and_the_socket_is_removed_at_the_end(tmp_path):
     path = tmp_path / "control"
     with ControlSocket(path, echoed):
         assert request(path, "good") == "GOOD"
         assert request(path, "") == ""
-        with pytest.raises(EmulatorError, match="that is bad: say good"):
+        with pytest.raises(EmulatorError, match="unknown word: send good"):
             request(path, "bad")
         assert request(path, "again") == "AGAIN"
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
@@ -34,38 +34,38 @@ def test_a_line_is_answered_and_the_socket_is_gone_afterwards(tmp_path):
     assert missing.value.missing
 
 
-def test_several_lines_of_one_caller_in_any_pieces(tmp_path):
-    with ControlSocket(tmp_path / "control", echoed), socket.socket(socket.AF_UNIX) as caller:
-        caller.connect(str(tmp_path / "control"))
+def test_one_client_sends_several_lines_in_chunks(tmp_path):
+    with ControlSocket(tmp_path / "control", echoed), socket.socket(socket.AF_UNIX) as client:
+        client.connect(str(tmp_path / "control"))
         for piece in (b"on", b"e\ntwo\nba", b"d\n\xff\xfe\n"):
-            caller.sendall(piece)
-        answers = caller.makefile(encoding="utf-8")
-        assert [answers.readline() for _ in range(3)] == ["ok ONE\n", "ok TWO\n", "error: that is bad: say good\n"]
-        assert answers.readline().startswith("ok ")
+            client.sendall(piece)
+        replies = client.makefile(encoding="utf-8")
+        assert [replies.readline() for _ in range(3)] == ["ok ONE\n", "ok TWO\n", "error: unknown word: send good\n"]
+        assert replies.readline().startswith("ok ")
 
 
-def test_an_endless_line_is_hung_up_on(tmp_path):
+def test_an_overlong_line_closes_the_connection(tmp_path):
     with ControlSocket(tmp_path / "control", echoed):
-        with socket.socket(socket.AF_UNIX) as caller:
-            caller.connect(str(tmp_path / "control"))
-            caller.sendall(b"x" * 5000)
-            caller.settimeout(60.0)
+        with socket.socket(socket.AF_UNIX) as client:
+            client.connect(str(tmp_path / "control"))
+            client.sendall(b"x" * 5000)
+            client.settimeout(60.0)
             with contextlib.suppress(ConnectionResetError):
-                assert caller.recv(10) == b""
+                assert client.recv(10) == b""
         assert request(tmp_path / "control", "good") == "GOOD"
 
 
-def test_what_a_killed_program_left_is_cleared_away_and_nothing_else(tmp_path):
-    left, file = tmp_path / "left", tmp_path / "file"
+def test_only_the_stale_socket_of_a_killed_program_is_replaced(tmp_path):
+    stale, file = tmp_path / "stale", tmp_path / "file"
     with socket.socket(socket.AF_UNIX) as dead:
-        dead.bind(str(left))
+        dead.bind(str(stale))
     file.write_text("mine")
-    with ControlSocket(left, echoed):
-        assert request(left, "good") == "GOOD"
+    with ControlSocket(stale, echoed):
+        assert request(stale, "good") == "GOOD"
         with pytest.raises(EmulatorError, match="of a running program"):
-            ControlSocket(left, echoed).__enter__()
-        assert request(left, "still") == "STILL"
-    with pytest.raises(EmulatorError, match="no socket"):
+            ControlSocket(stale, echoed).__enter__()
+        assert request(stale, "still") == "STILL"
+    with pytest.raises(EmulatorError, match="not a socket"):
         ControlSocket(file, echoed).__enter__()
     assert file.read_text() == "mine"
     with pytest.raises(EmulatorError, match="No such file") as missing:
@@ -75,7 +75,7 @@ def test_what_a_killed_program_left_is_cleared_away_and_nothing_else(tmp_path):
         ControlSocket(tmp_path / ("x" * 120), echoed).__enter__()
 
 
-def test_verbs_come_through_it(tmp_path):
+def test_fault_commands_work_through_the_socket(tmp_path):
     with (
         DynamixelEmulator([EmulatedServo("xl430_w250", 1)]) as emulator,
         ControlSocket(tmp_path / "control", FaultCommands(emulator).do),

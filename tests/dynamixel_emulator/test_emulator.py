@@ -1,4 +1,4 @@
-"""To the unmodified dynamixel-sdk the emulated port is a bus of servos, in all that its sample programs do."""
+"""The unmodified dynamixel-sdk works with the emulated port as with a bus of servos."""
 
 import fcntl
 import os
@@ -32,7 +32,7 @@ TCSETS2, RATE_BITS, RATE_IS_A_NUMBER = 0x402C542B, 0o10017, 0o10000  # asm-gener
 
 
 class Client:
-    """The SDK at the emulated port, with the emulator at hand."""
+    """The SDK connected to the emulated port, with access to the emulator."""
 
     def __init__(self, emulator, baud_rate=57600):
         self.emulator, self.handler = emulator, PacketHandler(2.0)
@@ -55,10 +55,10 @@ class Client:
         return value
 
     def until(self, done, within_s=60.0):
-        """Asks again until it is so: each question takes its time on the wire."""
+        """Polls until the condition holds; each request takes its time on the wire."""
         end_s = time.monotonic() + within_s
         while not done():
-            assert time.monotonic() < end_s, "did not happen"
+            assert time.monotonic() < end_s, "timeout"
 
     def moves_to(self, number, goal):
         assert self.write(number, GOAL, goal, 4) == 0
@@ -66,9 +66,9 @@ class Client:
 
 
 @pytest.fixture(autouse=True)
-def patient(monkeypatch):
-    """The SDK waits for answers by the clock: longer here, as other programs may keep the emulator waiting."""
-    monkeypatch.setattr(port_handler, "LATENCY_TIMER", 150)  # ms; half of what it waits
+def long_timeout(monkeypatch):
+    """Increases the SDK's timeout, because other programs can delay the emulator."""
+    monkeypatch.setattr(port_handler, "LATENCY_TIMER", 150)  # ms; half of the timeout
 
 
 @pytest.fixture
@@ -144,9 +144,9 @@ def test_bulk_write_and_read(client):
 
 
 def test_indirect_access(client):
-    places = [*range(GOAL, GOAL + 4), LED]
-    for i, place in enumerate(places):
-        assert client.write(1, INDIRECT_ADDRESS + 2 * i, place, 2) == 0
+    addresses = [*range(GOAL, GOAL + 4), LED]
+    for i, address in enumerate(addresses):
+        assert client.write(1, INDIRECT_ADDRESS + 2 * i, address, 2) == 0
     client.write(1, TORQUE, 1)
     assert client.write(1, INDIRECT_ADDRESS, 132, 2) == StatusError.ACCESS
     data = [*(1234).to_bytes(4, "little"), 1]
@@ -155,7 +155,7 @@ def test_indirect_access(client):
     assert client.handler.readTxRx(client.port, 1, INDIRECT_DATA, 5)[0] == data
 
 
-def test_what_is_registered_happens_at_the_action(client):
+def test_a_registered_write_is_executed_by_action(client):
     data = list((900).to_bytes(4, "little"))
     assert client.handler.regWriteTxRx(client.port, 1, GOAL, 4, data) == (COMM_SUCCESS, 0)
     assert (client.read(1, GOAL), client.read(1, REGISTERED, 1)) == (2048, 1)
@@ -164,8 +164,8 @@ def test_what_is_registered_happens_at_the_action(client):
     assert client.read(1, REGISTERED, 1) == 0
 
 
-def test_a_reboot_switches_torque_off_and_is_deaf_for_a_while(client, monkeypatch):
-    monkeypatch.setattr(emulated_servo, "REBOOT_S", 1.5)  # longer than other programs may keep this one waiting
+def test_a_reboot_switches_torque_off_and_receives_nothing_for_a_while(client, monkeypatch):
+    monkeypatch.setattr(emulated_servo, "REBOOT_S", 1.5)  # longer than other programs can delay this one
     client.write(1, TORQUE, 1)
     client.moves_to(1, 1000)
     assert client.handler.reboot(client.port, 1) == (COMM_SUCCESS, 0)
@@ -174,7 +174,7 @@ def test_a_reboot_switches_torque_off_and_is_deaf_for_a_while(client, monkeypatc
     assert (client.read(1, TORQUE, 1), client.read(1, GOAL)) == (0, pytest.approx(1000, abs=5))
 
 
-def test_factory_reset_keeps_id_and_baud_rate_if_asked_to(client):
+def test_factory_reset_keeps_id_and_baud_rate_on_request(client):
     client.write(3, ID, 12)
     client.write(12, MODE, 4)
     assert client.handler.factoryReset(client.port, 12, 0x02) == (COMM_SUCCESS, 0)
@@ -188,7 +188,7 @@ def test_clear_multi_turn(client):
     client.write(1, MODE, 4)
     client.write(1, TORQUE, 1)
     client.moves_to(1, 5000)
-    client.write(1, PROFILE_VELOCITY, 20, 4)  # so slow that it surely moves still
+    client.write(1, PROFILE_VELOCITY, 20, 4)  # slow enough to be still moving
     client.write(1, GOAL, 9000, 4)
     assert client.handler.clearMultiTurn(client.port, 1) == (COMM_SUCCESS, StatusError.RESULT_FAIL)
     client.write(1, PROFILE_VELOCITY, 0, 4)
@@ -206,19 +206,19 @@ def test_clear_multi_turn(client):
         (GOAL, 4096, 4, StatusError.DATA_LIMIT),
         (GOAL, 100, 2, StatusError.DATA_LENGTH),
         (PRESENT, 100, 4, StatusError.ACCESS),
-        (40, 1, 1, StatusError.ACCESS),  # nothing is there
+        (40, 1, 1, StatusError.ACCESS),  # no register
         (5000, 1, 1, StatusError.ACCESS),
     ],
 )
-def test_what_cannot_be_written_is_refused_and_changes_nothing(client, address, value, size, error):
+def test_an_invalid_write_is_rejected_and_changes_nothing(client, address, value, size, error):
     before = bytes(client.servo(1).memory.read(0, 140))
     assert client.write(1, address, value, size) == error
     with client.emulator.lock:
         after = bytes(client.servo(1).memory.read(0, 140))
-    assert before[:120] == after[:120]  # beyond is what is measured
+    assert before[:120] == after[:120]  # measurements are above
 
 
-def test_what_is_kept_without_power_is_locked_while_torque_is_on(client):
+def test_eeprom_is_locked_while_torque_is_on(client):
     client.write(1, TORQUE, 1)
     assert client.write(1, ID, 5) == StatusError.ACCESS
     client.write(1, TORQUE, 0)
@@ -226,7 +226,7 @@ def test_what_is_kept_without_power_is_locked_while_torque_is_on(client):
     assert client.handler.ping(client.port, 5)[1] == COMM_SUCCESS
 
 
-def test_a_servo_at_another_baud_rate_hears_nothing(client):
+def test_a_servo_at_another_baud_rate_receives_nothing(client):
     assert client.write(1, BAUD, 3) == 0
     assert client.handler.ping(client.port, 1)[1] == COMM_RX_TIMEOUT
     client.port.setBaudRate(1_000_000)
@@ -235,8 +235,8 @@ def test_a_servo_at_another_baud_rate_hears_nothing(client):
 
 
 @pytest.mark.parametrize("baud_rate", [57_600, 1_000_000])
-def test_a_rate_that_is_set_as_a_number_and_not_by_its_name_is_the_same_rate(client, baud_rate):
-    """As programs in Rust do, and those that want a rate without a name."""
+def test_a_numeric_baud_rate_equals_the_predefined_one(client, baud_rate):
+    """Programs in Rust set numeric rates, as do programs with a rate that is not predefined."""
     client.servo(1).memory["Baud Rate"] = BAUD_RATES.index(baud_rate)
     settings = bytearray(fcntl.ioctl(client.port.ser.fileno(), TCGETS2, bytes(TERMIOS2.size)))
     modes = list(TERMIOS2.unpack(settings))
@@ -247,7 +247,7 @@ def test_a_rate_that_is_set_as_a_number_and_not_by_its_name_is_the_same_rate(cli
     assert client.handler.ping(client.port, 1) == (XL430_W250.number, COMM_SUCCESS, 0)
 
 
-def test_a_program_that_was_killed_does_not_keep_the_port_from_the_next(client):
+def test_exclusive_access_of_a_killed_program_is_released(client):
     client.port.closePort()
     emulator = client.emulator
     first = os.open(emulator.port, os.O_RDWR | os.O_NOCTTY)
@@ -255,33 +255,33 @@ def test_a_program_that_was_killed_does_not_keep_the_port_from_the_next(client):
     fcntl.ioctl(first, termios.TIOCEXCL)
 
     def exclusive() -> bool:
-        return fcntl.ioctl(emulator._theirs, TIOCGEXCL, bytes(4)) != bytes(4)
+        return fcntl.ioctl(emulator._slave, TIOCGEXCL, bytes(4)) != bytes(4)
 
-    for _ in range(5):  # idle rounds of the emulator
+    for _ in range(5):  # idle iterations of the emulator
         emulator._stopped.wait(0.01)
         assert exclusive()
-    os.close(first)  # as when it is killed
+    os.close(first)  # as if it was killed
     client.until(lambda: not exclusive())
     assert client.port.openPort()
     assert client.handler.ping(client.port, 1)[1] == COMM_SUCCESS
 
 
-def test_a_program_that_never_reads_does_not_stop_the_servos(client):
-    """The port of a computer drops what it cannot hold; so does this one."""
-    client.servo(1).memory["Baud Rate"] = 6  # quick
+def test_a_program_that_never_reads_does_not_block_the_servos(client):
+    """A serial port drops bytes when its buffer is full; so does the emulated one."""
+    client.servo(1).memory["Baud Rate"] = 6  # fast
     client.port.setBaudRate(4_000_000)
-    question = encoded(Packet(1, Instruction.READ, bytes([0, 0, 0x95, 0x02])))
-    for _ in range(60):  # 40 kB of answers
-        client.port.ser.write(question)
+    request = encoded(Packet(1, Instruction.READ, bytes([0, 0, 0x95, 0x02])))
+    for _ in range(60):  # 40 kB of replies
+        client.port.ser.write(request)
     client.port.ser.write(encoded(Packet(1, Instruction.WRITE, bytes([LED, 0, 1]))))
 
-    def heard():
+    def received():
         with client.emulator.lock:
             return client.servo(1).memory["LED"] == 1
 
-    client.until(heard)
+    client.until(received)
     led = (1, COMM_SUCCESS, 0)
-    client.until(lambda: client.handler.read1ByteTxRx(client.port, 1, LED) == led)  # behind what the port still held
+    client.until(lambda: client.handler.read1ByteTxRx(client.port, 1, LED) == led)  # after the buffered replies
 
 
 def test_status_return_level(client):
@@ -293,7 +293,7 @@ def test_status_return_level(client):
     assert client.handler.ping(client.port, 1)[1] == COMM_SUCCESS
 
 
-def test_the_bus_watchdog_stops_the_servo_and_refuses_goals_until_it_is_cleared(client):
+def test_the_bus_watchdog_stops_the_servo_and_rejects_goals_until_it_is_cleared(client):
     client.write(1, PROFILE_VELOCITY, 20, 4)
     client.write(1, TORQUE, 1)
     client.write(1, GOAL, 4000, 4)
@@ -312,7 +312,7 @@ def test_the_bus_watchdog_stops_the_servo_and_refuses_goals_until_it_is_cleared(
     client.moves_to(1, 2000)
 
 
-def test_a_hardware_error_is_told_with_every_answer(client):
+def test_a_hardware_error_sets_the_alert_bit_of_every_reply(client):
     with client.emulator.lock:
         client.servo(1).memory["Hardware Error Status"] = 0x20  # overload
     _, _, error = client.handler.ping(client.port, 1)
@@ -321,7 +321,7 @@ def test_a_hardware_error_is_told_with_every_answer(client):
 
 
 class SlowWorld:
-    """Each millisecond of it takes twenty of the processor."""
+    """Each simulated millisecond takes 20 ms of processor time."""
 
     def shafts(self):
         return [(2048.0, 0.0)]
@@ -337,37 +337,37 @@ def test_no_answer_waits_for_a_world_that_is_behind_and_other_programs_run_befor
         client = Client(emulator)
         began_s = time.monotonic()
         client.until(lambda: emulator.bus.now_s > 0.02)
-        for _ in range(3):  # the SDK waits 34 ms, which a busy machine may take for itself
+        for _ in range(3):  # the SDK's timeout can expire on a busy machine
             client.until(lambda: client.handler.ping(client.port, 1)[1] == COMM_SUCCESS)
         with emulator.lock:
             assert emulator.bus.now_s < 0.5 * (time.monotonic() - began_s)
 
-        def is_like_any_other():
-            emulator._stopped.wait(0.02)  # and not asks on: the two threads share one interpreter
+        def has_normal_priority():
+            emulator._stopped.wait(0.02)  # no polling: both threads share one interpreter
             return os.sched_getscheduler(emulator._thread.native_id) == os.SCHED_OTHER
 
-        client.until(is_like_any_other, 30.0)
+        client.until(has_normal_priority, 30.0)
         client.port.closePort()
 
 
 @pytest.mark.parametrize("allowed", [True, False])
 def test_servos_run_before_other_programs_where_the_system_allows_it(allowed, monkeypatch):
-    asked = []
+    requested = []
 
-    def sets(pid, policy, parameter):
-        asked.append((pid, policy, parameter.sched_priority))
+    def set_scheduler(pid, policy, parameter):
+        requested.append((pid, policy, parameter.sched_priority))
         if not allowed:
             raise PermissionError
 
-    monkeypatch.setattr(os, "sched_setscheduler", sets)
+    monkeypatch.setattr(os, "sched_setscheduler", set_scheduler)
     with DynamixelEmulator([EmulatedServo("xl430_w250")]) as emulator:
         client = Client(emulator)
         assert client.handler.ping(client.port, 1)[1] == COMM_SUCCESS
         client.port.closePort()
-    assert (0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, 1) in asked
+    assert (0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, 1) in requested
 
 
-def test_a_link_names_the_port_as_long_as_it_is_there(tmp_path):
+def test_a_link_exists_as_long_as_the_port(tmp_path):
     link = tmp_path / "usb-emulated"
     with DynamixelEmulator([EmulatedServo("xl430_w250")], link) as emulator:
         assert str(link.resolve()) == emulator.port
@@ -379,13 +379,13 @@ def test_a_link_names_the_port_as_long_as_it_is_there(tmp_path):
     assert not link.exists()
 
 
-def test_the_port_of_a_running_emulator_is_not_taken_from_it(tmp_path):
+def test_a_second_emulator_cannot_use_the_same_link(tmp_path):
     link = tmp_path / "usb-emulated"
     with DynamixelEmulator([EmulatedServo("xl430_w250")], link) as emulator:
-        with pytest.raises(EmulatorError, match="usb-emulated is the port of another emulator, which is running"):
+        with pytest.raises(EmulatorError, match="usb-emulated is the port of another running emulator"):
             DynamixelEmulator([EmulatedServo("xl430_w250")], link)
         emulator.unplug()
-        with pytest.raises(EmulatorError, match="another emulator"):
+        with pytest.raises(EmulatorError, match="another running emulator"):
             DynamixelEmulator([EmulatedServo("xl430_w250")], link)
         emulator.plug_in()
         assert str(link.resolve()) == emulator.port
@@ -393,7 +393,7 @@ def test_the_port_of_a_running_emulator_is_not_taken_from_it(tmp_path):
         assert str(link.resolve()) == emulator.port
 
 
-def test_a_pulled_plug_ends_the_port_and_a_new_one_has_the_old_link(tmp_path):
+def test_unplugging_removes_the_port_and_plugging_in_restores_the_link(tmp_path):
     link = tmp_path / "usb-emulated"
     with DynamixelEmulator([EmulatedServo("xl430_w250")], link) as emulator:
         client = Client(emulator)
@@ -410,27 +410,27 @@ def test_a_pulled_plug_ends_the_port_and_a_new_one_has_the_old_link(tmp_path):
         client.port.closePort()
 
 
-def test_what_lies_in_the_place_of_a_link_is_left_alone_unless_an_emulator_made_it(tmp_path):
+def test_a_link_replaces_only_links_of_earlier_emulators(tmp_path):
     file, adapter, old = (tmp_path / name for name in ("file", "usb-FTDI", "usb-emulated"))
     file.write_text("mine")
     adapter.symlink_to("/dev/ttyUSB7")
-    old.symlink_to("/dev/pts/9999")  # of one that was killed
+    old.symlink_to("/dev/pts/9999")  # of a killed emulator
     for taken in (file, adapter):
-        with pytest.raises(EmulatorError, match=f"{taken.name} is there already"):
+        with pytest.raises(EmulatorError, match=f"{taken.name} exists"):
             DynamixelEmulator([EmulatedServo("xl430_w250")], taken)
     assert (file.read_text(), os.readlink(adapter)) == ("mine", "/dev/ttyUSB7")
     with DynamixelEmulator([EmulatedServo("xl430_w250")], old) as emulator:
         assert os.readlink(old) == emulator.port
 
 
-def test_a_link_never_names_a_terminal_that_another_program_may_have_by_now(tmp_path, monkeypatch):
-    link, there = tmp_path / "usb-emulated", []
+def test_a_link_is_removed_before_its_terminal_is_closed(tmp_path, monkeypatch):
+    link, link_exists = tmp_path / "usb-emulated", []
     close = os.close
     with DynamixelEmulator([EmulatedServo("xl430_w250")], link) as emulator:
         monkeypatch.setattr(
             "dynamixel_emulator.emulator.os.close",
-            lambda number: there.append(link.is_symlink()) or close(number),
+            lambda number: link_exists.append(link.is_symlink()) or close(number),
         )
         emulator.unplug()
-        assert there[:2] == [False, False]
+        assert link_exists[:2] == [False, False]
         monkeypatch.undo()

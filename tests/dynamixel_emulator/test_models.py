@@ -1,7 +1,7 @@
-"""Every emulated model's table is ROBOTIS's, and that of the firmware which the servo reports.
+"""The table of each emulated model equals ROBOTIS's table for the firmware that the servo reports.
 
-Sources: `[file]` the `.model` files of ROBOTIS in dynamixel-sdk 4.1.0 (`dynamixel_easy_sdk/control_table`), the same as
-those of its ROS 2 driver (dynamixel_hardware_interface, `param/dxl_model`) in all that is compared; `[page]` the tables
+Sources: `[file]` the `.model` files of ROBOTIS in dynamixel-sdk 4.1.0 (`dynamixel_easy_sdk/control_table`); the files
+of its ROS 2 driver (dynamixel_hardware_interface, `param/dxl_model`) have the same values; `[page]` the tables
 "Control Table of EEPROM Area" and "of RAM Area" of the model's page in the ROBOTIS e-Manual.
 """
 
@@ -20,9 +20,9 @@ from dynamixel_emulator.servo import EmulatedServo
 TABLES = files("dynamixel_easy_sdk") / "control_table"
 NUMBERS = {"xm430_w350": 1020, "xm430_w210": 1030, "xl430_w250": 1060, "xl330_m077": 1190, "xl330_m288": 1200}  # [file]
 
-# [page] Address, name, initial value and range of what can be written, for XM430-W350. A range that other registers
-# give is left out. Secondary ID: 253 to 255 switch it off. Bus Watchdog: 0 switches it off. Drive Mode: the three bits
-# of its description. Protocol Type may be 1 on the page: emulated servos have only Protocol 2.0.
+# [page] Address, name, initial value and range of writable registers, for XM430-W350. Ranges that other registers
+# define are omitted. Secondary ID: 253 to 255 disable it. Bus Watchdog: 0 disables it. Drive Mode: the three bits
+# of its description. Protocol Type can be 1 on the page: emulated servos have only Protocol 2.0.
 WRITABLE = """
 7 ID 1 0 252; 8 Baud Rate 1 0 7; 9 Return Delay Time 250 0 254; 10 Drive Mode 0 0 13; 11 Operating Mode 3 0 16
 12 Secondary(Shadow) ID 255 0 255; 13 Protocol Type 2 2 2; 20 Homing Offset 0 -1044479 1044479
@@ -53,7 +53,7 @@ OTHERS = {
 GOALS = {"Goal PWM": 100, "Goal Current": 102, "Goal Velocity": 104, "Goal Position": 116}
 MISSING = {"xl430_w250": {"Current Limit", "Goal Current"}}
 NOT_IN_THE_FILES = {"Startup Configuration": (60, 1), "Backup Ready": (147, 1)}  # [page]
-LAST_INDIRECT = {"xl330_m077": 227, "xl330_m288": 227}  # [page]; 661 of the others
+LAST_INDIRECT = {"xl330_m077": 227, "xl330_m288": 227}  # [page]; 661 for the others
 
 each_model = pytest.mark.parametrize("model", [
     *MODELS.values(), *(replace(MODELS[name], firmware=52) for name in ("xl330_m288", "xl330_m077")),
@@ -61,19 +61,19 @@ each_model = pytest.mark.parametrize("model", [
 
 
 def facts(text: str) -> dict[str, tuple[int, int, tuple[int, int]]]:
-    """By name: address, initial value, range."""
-    found = {}
+    """Address, initial value and range by register name."""
+    registers = {}
     for line in re.split(r"[;\n]", text):
         if line.strip():
             address, *name, initial, low, high = line.split()
-            found[" ".join(name)] = (int(address), int(initial), (int(low), int(high)))
-    return found
+            registers[" ".join(name)] = (int(address), int(initial), (int(low), int(high)))
+    return registers
 
 
 def published(model: ServoModel) -> dict[str, tuple[int, int]]:
-    """[file] Addresses and sizes by name, in the file that ROBOTIS's driver selects for this firmware."""
+    """[file] Addresses and sizes by name, from the file that ROBOTIS's driver selects for this firmware."""
     versions = [52] if (TABLES / f"{model.name}_fw52.model").is_file() and model.firmware >= 52 else []
-    assert model.firmware <= 52, "above its newest file the driver would take the one without a version"
+    assert model.firmware <= 52, "for newer firmware the driver selects the file without a version"
     file = TABLES / f"{model.name}{''.join(f'_fw{one}' for one in versions)}.model"
     _, _, table = file.read_text(encoding="utf-8").partition("[control table]\nAddress\tSize\tData Name\n")
     rows = [line.split("\t") for line in table.splitlines() if line.strip()]
@@ -83,7 +83,7 @@ def published(model: ServoModel) -> dict[str, tuple[int, int]]:
 @each_model
 def test_addresses_and_sizes_are_those_of_the_file_of_this_firmware(model: ServoModel) -> None:
     assert model.number == NUMBERS[model.name]
-    table = {name: place for name, place in published(model).items() if not name.startswith("Indirect")}
+    table = {name: row for name, row in published(model).items() if not name.startswith("Indirect")}
     assert {one.name: (one.address, one.size) for one in model.registers.values()} == table | NOT_IN_THE_FILES
 
 
@@ -102,15 +102,15 @@ def test_initial_values_and_ranges_are_those_of_the_page(model: ServoModel) -> N
 
 @each_model
 def test_the_driver_of_robotis_reads_positions_through_the_indirect_data(model: ServoModel) -> None:
-    """With the table of the wrong firmware it read 51.9 rad: the bytes of indirect addresses."""
+    """With the table of another firmware it reads 51.9 rad: the bytes of indirect addresses."""
     table, servo = published(model), EmulatedServo(model, position=1234.0)
     assert servo.memory["Firmware Version"] == model.firmware
     addresses, data = table["Indirect Address Read"][0], table["Indirect Data Read"][0]
     for i in range(4):
-        words = (addresses + 2 * i).to_bytes(2, "little") + (132 + i).to_bytes(2, "little")
-        assert servo.do(Instruction.WRITE, words).error == 0
-    answer = servo.do(Instruction.READ, data.to_bytes(2, "little") + b"\4\0")
-    assert int.from_bytes(answer.data, "little") == 1234
+        parameters = (addresses + 2 * i).to_bytes(2, "little") + (132 + i).to_bytes(2, "little")
+        assert servo.do(Instruction.WRITE, parameters).error == 0
+    reply = servo.do(Instruction.READ, data.to_bytes(2, "little") + b"\4\0")
+    assert int.from_bytes(reply.data, "little") == 1234
 
 
 @each_model

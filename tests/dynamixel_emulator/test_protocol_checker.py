@@ -1,4 +1,4 @@
-"""The judge finds what should not be sent, only that, and before it has an effect."""
+"""The checker reports exactly the client's errors, before the servos execute them."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def a_bus(servo_rules_only=False, **speeds):
     servos = [EmulatedServo(model, 1 + i) for i, model in enumerate(models)]
     bus = EmulatedBus(servos, servo_rules_only=servo_rules_only)
     if speeds:
-        bus.judge = ProtocolChecker(bus.servos, {int(name[1:]): speed for name, speed in speeds.items()})
+        bus.checker = ProtocolChecker(bus.servos, {int(name[1:]): speed for name, speed in speeds.items()})
     return bus
 
 
@@ -35,10 +35,10 @@ def write(address, value, size=1, number=1):
 
 
 def kinds(bus):
-    return [finding.kind for finding in bus.judge.findings]
+    return [finding.kind for finding in bus.checker.findings]
 
 
-def test_a_sound_program_is_found_nothing_of():
+def test_a_correct_program_has_no_findings():
     bus, now_s = a_bus(n1=1000.0), 1.0
     sent = [
         encoded(Packet(BROADCAST, Instruction.PING)),
@@ -62,25 +62,25 @@ def test_a_sound_program_is_found_nothing_of():
         now_s += 0.01
         for cut in (data[:5], data[5:]):
             bus.receive(cut, BAUD, now_s)
-    assert bus.judge.findings == []
-    assert bus.judge.packets == len(sent)
+    assert bus.checker.findings == []
+    assert bus.checker.packets == len(sent)
 
 
-def test_a_step_is_as_large_as_rate_and_time_allow():
+def test_the_allowed_step_depends_on_speed_and_time():
     bus = a_bus(n1=1000.0)
     bus.receive(write(TORQUE, 1), BAUD, 1.0)
-    bus.receive(write(GOAL, 2048 + 100, 4), BAUD, 1.01)  # the first may use the whole window
+    bus.receive(write(GOAL, 2048 + 100, 4), BAUD, 1.01)  # the first goal can use the whole window
     bus.receive(write(GOAL, 2148 + 22, 4), BAUD, 1.03)
     assert kinds(bus) == []
     bus.receive(write(GOAL, 2170 + 23, 4), BAUD, 1.05)
-    (found,) = bus.judge.findings
-    assert (found.id, found.kind) == (1, "step")
-    assert found.detail == "Goal Position goes from 2170 to 2193 within 20 ms: 1000 pulses/s allow 22 of these 23"
-    bus.receive(write(GOAL, 2193 + int(1000 * RATE_WINDOW_S) + 3, 4), BAUD, 9.0)  # a pause allows no jump
+    (finding,) = bus.checker.findings
+    assert (finding.id, finding.kind) == (1, "step")
+    assert finding.detail == "Goal Position goes from 2170 to 2193 within 20 ms: 1000 pulses/s allow 22 of these 23"
+    bus.receive(write(GOAL, 2193 + int(1000 * RATE_WINDOW_S) + 3, 4), BAUD, 9.0)  # a pause does not allow a jump
     assert kinds(bus) == ["step", "step"]
 
 
-def test_without_a_rate_the_speed_of_the_servo_counts():
+def test_without_a_speed_the_no_load_speed_of_the_servo_applies():
     bus = a_bus()
     bus.receive(write(TORQUE, 1), BAUD, 1.0)
     bus.receive(write(GOAL, 2048 + 380, 4), BAUD, 1.01)  # 57 rev/min: 389 in 0.1 s
@@ -91,59 +91,59 @@ def test_without_a_rate_the_speed_of_the_servo_counts():
 
 @pytest.mark.parametrize(("number", "addresses", "data"), [(1, 168, 224), (1, 578, 634), (2, 168, 224), (3, 168, 208)])
 def test_a_jump_through_indirect_data_is_found(number, addresses, data):
-    """ROBOTIS's ROS 2 driver sends all goals so."""
+    """ROBOTIS's ROS 2 driver sends all goals through indirect data."""
     bus = a_bus()
-    for i, place in enumerate((*range(GOAL, GOAL + 4), LED, 132)):  # the last one is of Present Position
-        bus.receive(write(addresses + 2 * i, place, 2, number), BAUD, 1.0)
+    for i, target in enumerate((*range(GOAL, GOAL + 4), LED, 132)):  # 132: Present Position, read-only
+        bus.receive(write(addresses + 2 * i, target, 2, number), BAUD, 1.0)
     bus.receive(write(TORQUE, 1, number=number), BAUD, 1.0)
     bus.receive(write(data, 2048 + 100, 4, number), BAUD, 1.5)
-    bus.receive(write(data, 2048, 5, number), BAUD, 2.0)  # LED too
+    bus.receive(write(data, 2048, 5, number), BAUD, 2.0)  # and LED
     assert kinds(bus) == []
     bus.receive(write(data, 4000, 4, number), BAUD, 2.01)
     assert kinds(bus) == ["step"]
-    assert bus.judge.findings[0].id == number
+    assert bus.checker.findings[0].id == number
     bus.receive(write(data, 4000, 2, number), BAUD, 2.1)
     bus.receive(write(data + 5, 7, 1, number), BAUD, 2.1)
     assert kinds(bus) == ["step", "register", "register"]
 
 
 def test_of_an_ordinary_client_only_what_servos_reject_is_found():
-    """It switches torque on with the goal elsewhere and jumps; as ROBOTIS's samples do."""
-    found = []
+    """It switches torque on away from the goal, and its goals jump, as in ROBOTIS's samples."""
+    findings = []
     for servo_rules_only in (False, True):
         bus = a_bus(servo_rules_only)
-        bus.servos[0].memory["Hardware Error Status"] = 0x01  # of the voltage: Shutdown does not name it
+        bus.servos[0].memory["Hardware Error Status"] = 0x01  # voltage: not enabled in Shutdown
         for data in (write(GOAL, 0, 4), write(TORQUE, 1), write(GOAL, 4095, 4), write(GOAL, 0, 4)):
             bus.receive(data, BAUD, 1.0)
-        found.append(kinds(bus))
+        findings.append(kinds(bus))
         bus.receive(write(ID, 7) + write(GOAL, 5000, 4) + b"hello" + write(132, 5, 4), BAUD, 2.0)
         bus.receive(write(TORQUE, 0), BAUD, 2.0)
         bus.servos[0].memory["Hardware Error Status"] = 0x20
         bus.receive(write(TORQUE, 1), BAUD, 2.0)
-    assert found == [["torque", "shut_down", "step", "step"], []]
+    assert findings == [["torque", "shut_down", "step", "step"], []]
     assert kinds(bus) == ["eeprom", "limit", "noise", "register", "shut_down"]
 
 
-def test_goals_beyond_limits_are_found():
+def test_goals_beyond_limits_are_reported():
     bus = a_bus()
     bus.receive(write(LIMIT, 3000, 4), BAUD, 1.0)
     for data in (write(GOAL, 3001, 4), write(GOAL, -1, 4), write(VELOCITY, -266, 4), write(100, 886, 2)):
         bus.receive(data, BAUD, 1.0)
     assert kinds(bus) == ["limit"] * 4
-    assert bus.judge.findings[0].detail == "Goal Position 3001 is outside of 0 to 3000"
+    assert bus.checker.findings[0].detail == "Goal Position 3001 is outside of 0 to 3000"
 
 
-def test_torque_must_not_come_on_with_the_goal_elsewhere():
+def test_torque_on_away_from_the_goal_is_reported():
     bus = a_bus()
     bus.receive(write(GOAL, 2200, 4), BAUD, 1.0)
     bus.receive(write(TORQUE, 1), BAUD, 1.1)
     assert kinds(bus) == ["torque"]
-    assert "152 pulses away" in bus.judge.findings[0].detail
-    bus.receive(write(TORQUE, 1), BAUD, 1.2)  # is on already
+    assert "152 pulses away" in bus.checker.findings[0].detail
+    bus.receive(write(TORQUE, 1), BAUD, 1.2)  # already on
     assert kinds(bus) == ["torque"]
 
 
-def test_eeprom_with_torque_on_a_tripped_watchdog_and_a_shut_down_servo_are_found():
+def test_writes_to_locked_tripped_and_shut_down_servos_are_reported():
     bus = a_bus()
     bus.receive(write(TORQUE, 1) + write(ID, 3), BAUD, 1.0)
     assert kinds(bus) == ["eeprom"]
@@ -157,12 +157,12 @@ def test_eeprom_with_torque_on_a_tripped_watchdog_and_a_shut_down_servo_are_foun
     assert kinds(bus) == ["eeprom", "watchdog", "shut_down"]
 
 
-def test_registers_that_cannot_be_written_so_are_found():
+def test_invalid_writes_to_registers_are_reported():
     bus = a_bus()
     for data in (write(132, 5, 4), write(GOAL, 5, 2), write(40, 1), write(GOAL + 2, 5, 4)):
         bus.receive(data, BAUD, 1.0)
     assert set(kinds(bus)) == {"register"}
-    assert bus.judge.counts["register"] >= 4
+    assert bus.checker.counts["register"] >= 4
 
 
 @pytest.mark.parametrize(
@@ -179,15 +179,15 @@ def test_registers_that_cannot_be_written_so_are_found():
         (b"\xff\xff\xfd\0\1\xff\xff", "length"),
     ],
 )
-def test_what_is_no_packet_or_none_that_means_something_is_found(data, kind):
+def test_noise_and_invalid_packets_are_reported(data, kind):
     bus = a_bus()
     bus.receive(data, BAUD, 1.0)
     assert kinds(bus)[0] == kind
     bus.receive(encoded(Packet(1, Instruction.PING)), BAUD, 1.05)
-    assert bus.judge.packets >= 1
+    assert bus.checker.packets >= 1
 
 
-def test_half_a_packet_is_found_when_its_time_is_over():
+def test_an_incomplete_packet_is_reported_after_its_timeout():
     bus = a_bus()
     bus.receive(write(TORQUE, 1)[:9], BAUD, 1.0)
     assert kinds(bus) == []
@@ -195,12 +195,12 @@ def test_half_a_packet_is_found_when_its_time_is_over():
     assert kinds(bus) == ["incomplete"]
 
 
-def test_the_bare_header_that_the_sdk_sends_is_found():
+def test_the_sdks_missing_byte_stuffing_is_reported():
     class Port:
         def __init__(self):
             self.is_using, self.sent = False, b""
 
-        def clearPort(self):  # noqa: N802 - called so by the SDK
+        def clearPort(self):  # noqa: N802 - name required by the SDK
             pass
 
         def writePort(self, packet):  # noqa: N802
@@ -214,25 +214,25 @@ def test_the_bare_header_that_the_sdk_sends_is_found():
     assert kinds(bus) == ["stuffing"]
 
 
-def test_only_the_first_findings_are_kept_but_all_are_counted():
+def test_only_the_first_findings_are_stored_but_all_are_counted():
     bus = a_bus()
     for number in range(MAX_FINDINGS + 5):
         bus.receive(write(132, number, 4), BAUD, 1.0)
-    assert (len(bus.judge.findings), bus.judge.counts["register"]) == (MAX_FINDINGS, MAX_FINDINGS + 5)
+    assert (len(bus.checker.findings), bus.checker.counts["register"]) == (MAX_FINDINGS, MAX_FINDINGS + 5)
 
 
 packets = st.builds(Packet, st.integers(0, 254), st.integers(0, 255), st.binary(max_size=30))
 
 
 @given(st.lists(packets | st.binary(max_size=12), max_size=8), st.lists(st.integers(1, 30), min_size=1, max_size=10))
-def test_every_byte_is_handed_on_once_and_sound_packets_one_at_a_time(said, sizes):
-    data = b"".join(encoded(one) if isinstance(one, Packet) else one for one in said)
-    judge, out, at, turn = ProtocolChecker([]), [], 0, 0
+def test_every_byte_is_yielded_once_and_valid_packets_one_at_a_time(sent, sizes):
+    data = b"".join(encoded(one) if isinstance(one, Packet) else one for one in sent)
+    checker, out, at, iteration = ProtocolChecker([]), [], 0, 0
     while at < len(data):
-        out += judge.pieces(data[at : at + sizes[turn % len(sizes)]], 1.0)
-        at, turn = at + sizes[turn % len(sizes)], turn + 1
+        out += checker.pieces(data[at : at + sizes[iteration % len(sizes)]], 1.0)
+        at, iteration = at + sizes[iteration % len(sizes)], iteration + 1
     assert b"".join(out) == data
     reader = PacketReader()
-    if all(isinstance(one, Packet) for one in said):
+    if all(isinstance(one, Packet) for one in sent):
         assert max((len(list(reader.feed(piece))) for piece in out), default=0) <= 1
-        assert judge.packets == len(said)
+        assert checker.packets == len(sent)

@@ -1,6 +1,6 @@
-"""What the sample programs of dynamixel-sdk for Protocol 2.0 do, written anew from its documented calls.
+"""The sample programs of dynamixel-sdk for Protocol 2.0, rewritten from its documented calls.
 
-The SDK is as it is installed; only the name of the port and the baud rate are those of the emulator.
+The SDK is unmodified; only the name of the port and the baud rate are the emulator's.
 """
 
 import time
@@ -38,8 +38,8 @@ LOW, HIGH = 1800, 2300
 
 
 @pytest.fixture(autouse=True)
-def patient(monkeypatch):
-    """Other programs may keep the emulator waiting."""
+def long_timeout(monkeypatch):
+    """Increases the SDK's timeout, because other programs can delay the emulator."""
     monkeypatch.setattr(port_handler, "LATENCY_TIMER", 150)
 
 
@@ -62,16 +62,16 @@ def port(emulator):
 packets = PacketHandler(2.0)
 
 
-def good(answer):
-    """The sample programs print what is wrong; here it ends the test. Gives what was read, if anything."""
-    *value, result, error = answer
+def succeeded(reply):
+    """Fails the test on an error, which the sample programs print; returns the value that was read, if any."""
+    *value, result, error = reply
     assert result == COMM_SUCCESS, packets.getTxRxResult(result)
     assert error == 0, packets.getRxPacketError(error)
     return value[0] if value else None
 
 
 def parts(value):
-    """Four bytes, as the samples take a position apart."""
+    """The four bytes of a position, as in the samples."""
     low, high = DXL_LOWORD(value), DXL_HIWORD(value)
     return [DXL_LOBYTE(low), DXL_HIBYTE(low), DXL_LOBYTE(high), DXL_HIBYTE(high)]
 
@@ -79,16 +79,16 @@ def parts(value):
 def until(done, within_s=60.0):
     end_s = time.monotonic() + within_s
     while not done():
-        assert time.monotonic() < end_s, "did not happen"
+        assert time.monotonic() < end_s, "timeout"
 
 
 def goes_to(port, number, goal):
-    good(packets.write4ByteTxRx(port, number, GOAL, goal))
-    until(lambda: abs(good(packets.read4ByteTxRx(port, number, PRESENT)) - goal) <= NEAR)
+    succeeded(packets.write4ByteTxRx(port, number, GOAL, goal))
+    until(lambda: abs(succeeded(packets.read4ByteTxRx(port, number, PRESENT)) - goal) <= NEAR)
 
 
 def test_ping(port):
-    assert good(packets.ping(port, 1)) == 1060
+    assert succeeded(packets.ping(port, 1)) == 1060
 
 
 def test_broadcast_ping(port):
@@ -98,16 +98,16 @@ def test_broadcast_ping(port):
 
 
 def test_read_write(port):
-    good(packets.write1ByteTxRx(port, 1, TORQUE, 1))
+    succeeded(packets.write1ByteTxRx(port, 1, TORQUE, 1))
     for goal in (LOW, HIGH):
         goes_to(port, 1, goal)
-    good(packets.write1ByteTxRx(port, 1, TORQUE, 0))
+    succeeded(packets.write1ByteTxRx(port, 1, TORQUE, 0))
 
 
 def test_sync_read_write_and_fast_sync_read(port):
     writer, reader = GroupSyncWrite(port, packets, GOAL, 4), GroupSyncRead(port, packets, PRESENT, 4)
     for number in (1, 2):
-        good(packets.write1ByteTxRx(port, number, TORQUE, 1))
+        succeeded(packets.write1ByteTxRx(port, number, TORQUE, 1))
         assert reader.addParam(number)
     for goal, read in ((LOW, reader.txRxPacket), (HIGH, reader.fastSyncRead)):
         for number in (1, 2):
@@ -125,7 +125,7 @@ def test_sync_read_write_and_fast_sync_read(port):
 
 def test_bulk_read_write_and_fast_bulk_read(port):
     writer, reader = GroupBulkWrite(port, packets), GroupBulkRead(port, packets)
-    good(packets.write1ByteTxRx(port, 1, TORQUE, 1))
+    succeeded(packets.write1ByteTxRx(port, 1, TORQUE, 1))
     assert reader.addParam(1, PRESENT, 4)
     assert reader.addParam(2, LED, 1)
     for goal, led, read in ((LOW, 0, reader.txRxPacket), (HIGH, 1, reader.fastBulkRead)):
@@ -144,11 +144,11 @@ def test_bulk_read_write_and_fast_bulk_read(port):
 
 def test_indirect_address(port):
     for i in range(4):
-        good(packets.write2ByteTxRx(port, 1, INDIRECT_ADDRESS + 2 * i, GOAL + i))
-        good(packets.write2ByteTxRx(port, 1, INDIRECT_ADDRESS + 2 * (5 + i), PRESENT + i))
-    good(packets.write2ByteTxRx(port, 1, INDIRECT_ADDRESS + 2 * 4, LED))
-    good(packets.write2ByteTxRx(port, 1, INDIRECT_ADDRESS + 2 * 9, MOVING))
-    good(packets.write1ByteTxRx(port, 1, TORQUE, 1))
+        succeeded(packets.write2ByteTxRx(port, 1, INDIRECT_ADDRESS + 2 * i, GOAL + i))
+        succeeded(packets.write2ByteTxRx(port, 1, INDIRECT_ADDRESS + 2 * (5 + i), PRESENT + i))
+    succeeded(packets.write2ByteTxRx(port, 1, INDIRECT_ADDRESS + 2 * 4, LED))
+    succeeded(packets.write2ByteTxRx(port, 1, INDIRECT_ADDRESS + 2 * 9, MOVING))
+    succeeded(packets.write1ByteTxRx(port, 1, TORQUE, 1))
     writer = GroupSyncWrite(port, packets, INDIRECT_DATA, 5)
     reader = GroupSyncRead(port, packets, INDIRECT_DATA + 5, 5)
     assert reader.addParam(1)
@@ -160,68 +160,68 @@ def test_indirect_address(port):
         return abs(reader.getData(1, INDIRECT_DATA + 5, 4) - HIGH) <= NEAR
 
     until(there)
-    assert good(packets.read1ByteTxRx(port, 1, LED)) == 1
+    assert succeeded(packets.read1ByteTxRx(port, 1, LED)) == 1
     until(lambda: there() and reader.getData(1, INDIRECT_DATA + 9, 1) == 0)
 
 
 def test_reboot(port):
-    good(packets.write1ByteTxRx(port, 1, LED, 1))
-    good(packets.reboot(port, 1))
+    succeeded(packets.write1ByteTxRx(port, 1, LED, 1))
+    succeeded(packets.reboot(port, 1))
     until(lambda: packets.ping(port, 1)[1] == COMM_SUCCESS)
-    assert good(packets.read1ByteTxRx(port, 1, LED)) == 0
+    assert succeeded(packets.read1ByteTxRx(port, 1, LED)) == 0
 
 
 def test_factory_reset(port):
-    good(packets.write1ByteTxRx(port, 1, MODE, 1))
-    good(packets.factoryReset(port, 1, 0x01))  # all but the ID
+    succeeded(packets.write1ByteTxRx(port, 1, MODE, 1))
+    succeeded(packets.factoryReset(port, 1, 0x01))  # except the ID
     assert port.setBaudRate(57600)
     until(lambda: packets.ping(port, 1)[1] == COMM_SUCCESS)
-    assert good(packets.read1ByteTxRx(port, 1, BAUD_RATE)) == 1
-    assert good(packets.read1ByteTxRx(port, 1, MODE)) == 3
-    good(packets.write1ByteTxRx(port, 1, BAUD_RATE, 3))
+    assert succeeded(packets.read1ByteTxRx(port, 1, BAUD_RATE)) == 1
+    assert succeeded(packets.read1ByteTxRx(port, 1, MODE)) == 3
+    succeeded(packets.write1ByteTxRx(port, 1, BAUD_RATE, 3))
     assert port.setBaudRate(BAUD)
-    assert good(packets.ping(port, 1)) == 1060
+    assert succeeded(packets.ping(port, 1)) == 1060
 
 
 def test_extended_position_and_clear_multi_turn(port):
-    good(packets.write1ByteTxRx(port, 1, MODE, 4))
-    good(packets.write1ByteTxRx(port, 1, TORQUE, 1))
+    succeeded(packets.write1ByteTxRx(port, 1, MODE, 4))
+    succeeded(packets.write1ByteTxRx(port, 1, TORQUE, 1))
     goes_to(port, 1, 4300)
-    good(packets.write4ByteTxRx(port, 1, GOAL, 2**32 - 500))
+    succeeded(packets.write4ByteTxRx(port, 1, GOAL, 2**32 - 500))
 
     def at_minus_500():
-        return abs(good(packets.read4ByteTxRx(port, 1, PRESENT)) - 2**32 + 500) <= NEAR
+        return abs(succeeded(packets.read4ByteTxRx(port, 1, PRESENT)) - 2**32 + 500) <= NEAR
 
     until(at_minus_500)
-    until(lambda: good(packets.read4ByteTxRx(port, 1, PRESENT_VELOCITY)) == 0)
-    good(packets.write1ByteTxRx(port, 1, TORQUE, 0))
-    good(packets.clearMultiTurn(port, 1))
-    assert abs(good(packets.read4ByteTxRx(port, 1, PRESENT)) - (4096 - 500)) <= NEAR
+    until(lambda: succeeded(packets.read4ByteTxRx(port, 1, PRESENT_VELOCITY)) == 0)
+    succeeded(packets.write1ByteTxRx(port, 1, TORQUE, 0))
+    succeeded(packets.clearMultiTurn(port, 1))
+    assert abs(succeeded(packets.read4ByteTxRx(port, 1, PRESENT)) - (4096 - 500)) <= NEAR
 
 
 def test_reg_write_and_action(port):
     for number in (1, 2):
-        good(packets.write1ByteTxRx(port, number, TORQUE, 1))
-        good(packets.regWriteTxRx(port, number, GOAL, 4, parts(LOW)))
-    assert good(packets.read4ByteTxRx(port, 1, PRESENT)) == 2048
+        succeeded(packets.write1ByteTxRx(port, number, TORQUE, 1))
+        succeeded(packets.regWriteTxRx(port, number, GOAL, 4, parts(LOW)))
+    assert succeeded(packets.read4ByteTxRx(port, 1, PRESENT)) == 2048
     assert packets.action(port, 254) == COMM_SUCCESS
     for number in (1, 2):
-        until(lambda number=number: abs(good(packets.read4ByteTxRx(port, number, PRESENT)) - LOW) <= NEAR)
+        until(lambda number=number: abs(succeeded(packets.read4ByteTxRx(port, number, PRESENT)) - LOW) <= NEAR)
 
 
-def test_velocity_mode_and_a_profile_by_time(port):
-    good(packets.write1ByteTxRx(port, 2, MODE, 1))
-    good(packets.write1ByteTxRx(port, 2, TORQUE, 1))
-    good(packets.write4ByteTxRx(port, 2, GOAL_VELOCITY, 2**32 - 50))
-    until(lambda: good(packets.read4ByteTxRx(port, 2, PRESENT_VELOCITY)) == 2**32 - 50)
-    good(packets.write1ByteTxRx(port, 3, DRIVE_MODE, 4))
-    good(packets.write4ByteTxRx(port, 3, PROFILE_VELOCITY, 300))
-    good(packets.write1ByteTxRx(port, 3, TORQUE, 1))
+def test_velocity_mode_and_a_time_based_profile(port):
+    succeeded(packets.write1ByteTxRx(port, 2, MODE, 1))
+    succeeded(packets.write1ByteTxRx(port, 2, TORQUE, 1))
+    succeeded(packets.write4ByteTxRx(port, 2, GOAL_VELOCITY, 2**32 - 50))
+    until(lambda: succeeded(packets.read4ByteTxRx(port, 2, PRESENT_VELOCITY)) == 2**32 - 50)
+    succeeded(packets.write1ByteTxRx(port, 3, DRIVE_MODE, 4))
+    succeeded(packets.write4ByteTxRx(port, 3, PROFILE_VELOCITY, 300))
+    succeeded(packets.write1ByteTxRx(port, 3, TORQUE, 1))
     goes_to(port, 3, HIGH)
 
 
 class TestEasySdk:
-    """The client of higher level that comes with the SDK."""
+    """The high-level client of the SDK."""
 
     @pytest.fixture
     def connector(self, emulator):
@@ -229,12 +229,12 @@ class TestEasySdk:
         yield connector
         connector.closePort()
 
-    def test_it_finds_all_and_knows_their_models(self, connector):
+    def test_it_finds_all_servos_and_their_models(self, connector):
         motors = connector.createAllMotors()
         assert [(motor.id, motor.model_number) for motor in motors] == [(1, 1060), (2, 1020), (3, 1030)]
         assert [motor.operating_mode_status for motor in motors] == [OperatingMode.POSITION] * 3
 
-    def test_it_moves_one(self, connector):
+    def test_it_moves_one_servo(self, connector):
         motor = connector.createMotor(2)
         motor.setPositionPGain(900)
         motor.setProfileConfiguration(ProfileConfiguration.TIME_BASED)
@@ -253,15 +253,15 @@ class TestEasySdk:
         motor.enableTorque()
         motor.setGoalVelocity(-40)
         until(lambda: motor.getPresentVelocity() == -40)
-        assert motor.getPresentCurrent() == 0  # it carries nothing
+        assert motor.getPresentCurrent() == 0  # no load
         motor.disableTorque()
         motor.changeID(7)
         assert motor.ping() == 1020
         motor.factoryResetExceptIDAndBaudRate()
-        until(lambda: _answers(motor))
+        until(lambda: _replies(motor))
         assert motor.getOperatingMode() == OperatingMode.POSITION
 
-    def test_it_moves_several_at_once(self, connector):
+    def test_it_moves_several_servos_simultaneously(self, connector):
         first, second = connector.createMotor(1), connector.createMotor(3)
         group = connector.createGroupExecutor()
         for motor in (first, second):
@@ -279,20 +279,20 @@ class TestEasySdk:
         group.addCmd(second.stageGetPresentVelocity())
         until(lambda: group.executeRead() == [0, 0])
 
-    def test_a_servo_that_is_not_there_is_told(self, connector):
-        with pytest.raises(DxlRuntimeError) as told:
+    def test_a_missing_servo_is_reported(self, connector):
+        with pytest.raises(DxlRuntimeError) as error:
             connector.createMotor(9)
-        assert told.value.dxl_error == DxlError.SDK_COMM_RX_TIMEOUT
+        assert error.value.dxl_error == DxlError.SDK_COMM_RX_TIMEOUT
 
 
-def _answers(motor):
+def _replies(motor):
     try:
         return motor.ping() > 0
     except DxlRuntimeError:
         return False
 
 
-def test_easy_sdk_knows_the_smallest_model():
+def test_easy_sdk_supports_xl330_m077():
     with DynamixelEmulator([EmulatedServo("xl330_m077", 1, BAUD)]) as emulator:
         connector = Connector(emulator.port, BAUD)
         (motor,) = connector.createAllMotors()

@@ -1,4 +1,4 @@
-"""One servo, without a bus: what the e-Manual says of modes, backup, indirect access and start."""
+"""One servo without a bus: modes, backup, indirect access and startup as in the e-Manual."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ INDIRECT = 168
 
 
 def write(servo, name, value):
-    """To a register by its name, or to an address of two bytes."""
+    """Writes a register by name, or two bytes at an address; returns the error byte."""
     one = servo.model.registers.get(name)
     address, size = (one.address, one.size) if one else (name, 2)
     data = (value % (1 << 8 * size)).to_bytes(size, "little")
@@ -25,18 +25,18 @@ def read(servo, address, size):
     return servo.do(Instruction.READ, address.to_bytes(2, "little") + size.to_bytes(2, "little")).data
 
 
-def test_another_operating_mode_has_initial_gains_and_no_profile():
+def test_a_change_of_operating_mode_resets_gains_and_profile():
     servo = EmulatedServo("xm430_w350")
     for name in ("Profile Velocity", "Profile Acceleration", "Position P Gain", "Feedforward 1st Gain"):
         assert write(servo, name, 55) == 0
     assert write(servo, "Operating Mode", 3) == 0
-    assert servo.memory["Position P Gain"] == 55  # as it was in that mode
+    assert servo.memory["Position P Gain"] == 55  # mode unchanged
     assert write(servo, "Operating Mode", 4) == 0
-    kept = {name: servo.memory[name] for name in ("Profile Velocity", "Profile Acceleration", "Position P Gain")}
-    assert kept == {"Profile Velocity": 0, "Profile Acceleration": 0, "Position P Gain": 800}
+    values = {name: servo.memory[name] for name in ("Profile Velocity", "Profile Acceleration", "Position P Gain")}
+    assert values == {"Profile Velocity": 0, "Profile Acceleration": 0, "Position P Gain": 800}
 
 
-def test_torque_in_position_mode_begins_within_one_turn():
+def test_torque_on_in_position_mode_reduces_the_position_to_one_turn():
     servo = EmulatedServo("xl430_w250")
     servo.turned(5000.0)
     assert servo.memory["Present Position"] == 5000
@@ -64,9 +64,9 @@ def test_a_homing_offset_of_more_than_a_quarter_turn_is_ignored_in_position_mode
 
 
 @pytest.mark.parametrize("model", sorted(MODELS))
-def test_a_backup_brings_back_what_is_kept_without_power(model):
+def test_a_backup_restores_eeprom(model):
     servo = EmulatedServo(model, 5)
-    assert servo.do(Instruction.BACKUP, RESTORE).error == StatusError.RESULT_FAIL  # there is none yet
+    assert servo.do(Instruction.BACKUP, RESTORE).error == StatusError.RESULT_FAIL  # no backup yet
     write(servo, "Operating Mode", 4)
     write(servo, "Position P Gain", 321)
     assert read(servo, 147, 1) == b"\x00"
@@ -80,14 +80,14 @@ def test_a_backup_brings_back_what_is_kept_without_power(model):
     assert (servo.id, servo.memory["Operating Mode"], servo.memory["Position P Gain"]) == (5, 4, p_gain)
 
 
-def test_no_backup_while_torque_is_on_nor_of_another_kind():
+def test_backup_is_rejected_while_torque_is_on_or_with_invalid_parameters():
     servo = EmulatedServo("xl330_m288")
     assert servo.do(Instruction.BACKUP, b"\x03" + STORE[1:]).error == StatusError.DATA_RANGE
     write(servo, "Torque Enable", 1)
     assert servo.do(Instruction.BACKUP, STORE).error == StatusError.RESULT_FAIL
 
 
-def test_a_servo_may_start_with_torque_and_with_gains_of_the_backup():
+def test_a_servo_can_start_with_torque_on_and_gains_from_the_backup():
     servo = EmulatedServo("xl330_m288", position=1500.0)
     for name, value in (("Startup Configuration", 3), ("Position P Gain", 321), (INDIRECT, 65)):
         assert write(servo, name, value) == 0
@@ -108,26 +108,26 @@ def test_a_servo_may_start_with_torque_and_with_gains_of_the_backup():
 @pytest.mark.parametrize(
     ("model", "last"), [(XM430_W350, 661), (XL330_M288, 251), (replace(XL330_M288, firmware=52), 227)]
 )
-def test_indirect_addresses_are_whole_and_of_ram(model, last):
+def test_indirect_addresses_must_be_complete_and_in_ram(model, last):
     servo = EmulatedServo(model)
     half = servo.do(Instruction.WRITE, INDIRECT.to_bytes(2, "little") + b"\x41")
     assert half.error == StatusError.DATA_LENGTH
-    for place, error in ((63, StatusError.DATA_RANGE), (64, 0), (last, 0), (last + 1, StatusError.DATA_RANGE)):
-        assert write(servo, INDIRECT, place) == error
+    for address, error in ((63, StatusError.DATA_RANGE), (64, 0), (last, 0), (last + 1, StatusError.DATA_RANGE)):
+        assert write(servo, INDIRECT, address) == error
     write(servo, "Torque Enable", 1)
     assert write(servo, INDIRECT, 64) == StatusError.ACCESS
 
 
 @pytest.mark.parametrize(
-    ("velocity", "acceleration", "way", "during"),
+    ("velocity", "acceleration", "distance", "during"),
     [(0, 0, 500, 0x00), (100, 0, 500, 0x12), (100, 2, 200, 0x22), (100, 10, 1500, 0x32)],
 )
-def test_moving_status_tells_the_profile_and_when_the_servo_is_there(velocity, acceleration, way, during):
+def test_moving_status_reports_profile_and_arrival(velocity, acceleration, distance, during):
     servo = EmulatedServo("xl430_w250")
     assert servo.memory["Moving Status"] == 0
     for name, value in (
         ("Profile Velocity", velocity), ("Profile Acceleration", acceleration), ("Torque Enable", 1),
-        ("Goal Position", 2048 + way),
+        ("Goal Position", 2048 + distance),
     ):  # fmt: skip
         assert write(servo, name, value) == 0
     servo.run_to(0.02)
@@ -136,7 +136,7 @@ def test_moving_status_tells_the_profile_and_when_the_servo_is_there(velocity, a
     assert servo.memory["Moving Status"] == (during & 0x30) | 0x01
 
 
-def test_a_profile_is_of_the_registers_when_the_goal_came():
+def test_a_profile_uses_the_registers_at_the_time_of_the_goal():
     servo = EmulatedServo("xl430_w250")
     write(servo, "Profile Velocity", 20)
     write(servo, "Torque Enable", 1)
@@ -149,7 +149,7 @@ def test_a_profile_is_of_the_registers_when_the_goal_came():
     assert servo.memory["Velocity Trajectory"] == 40
 
 
-def test_moving_is_told_while_a_profile_is_slower_than_the_threshold():
+def test_moving_is_set_while_a_profile_is_slower_than_the_threshold():
     servo = EmulatedServo("xl430_w250")
     for name, value in (("Profile Velocity", 4), ("Torque Enable", 1), ("Goal Position", 2060)):
         write(servo, name, value)
@@ -159,7 +159,7 @@ def test_moving_is_told_while_a_profile_is_slower_than_the_threshold():
     assert servo.memory["Moving"] == 0
 
 
-def test_acceleration_without_velocity_is_no_profile_but_in_velocity_mode():
+def test_acceleration_without_velocity_is_a_profile_only_in_velocity_mode():
     servo = EmulatedServo("xl430_w250")
     for name, value in (("Profile Acceleration", 1), ("Torque Enable", 1), ("Goal Position", 3000)):
         write(servo, name, value)
@@ -171,7 +171,7 @@ def test_acceleration_without_velocity_is_no_profile_but_in_velocity_mode():
         ("Goal Velocity", 100),
     ):  # fmt: skip
         write(wheel, name, value)
-    wheel.run_to(0.5)  # half of the 1000 ms in which a profile by time gains speed
+    wheel.run_to(0.5)  # half of the acceleration time of 1000 ms
     assert wheel.memory["Present Velocity"] == pytest.approx(50, abs=1)
 
 
@@ -184,14 +184,14 @@ def test_realtime_tick_counts_from_the_start():
     assert servo.memory["Realtime Tick"] == pytest.approx(500, abs=2)
 
 
-def test_the_answer_to_a_reboot_still_has_the_alert():
+def test_the_reply_to_a_reboot_still_has_the_alert_bit():
     servo = EmulatedServo("xl330_m288")
     servo.fail(HardwareError.OVERLOAD)
     assert servo.do(Instruction.REBOOT).error == ALERT
     assert servo.do(Instruction.PING).error == 0
 
 
-def test_an_xl330_may_switch_torque_on_by_a_goal():
+def test_an_xl330_can_switch_torque_on_by_a_goal():
     servo = EmulatedServo("xl330_m288")
     assert write(servo, "Drive Mode", 12) == 0
     assert write(servo, "Goal Position", 2100) == 0

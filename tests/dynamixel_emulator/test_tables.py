@@ -1,11 +1,11 @@
-"""The emulator's control tables, which are its own, and the driver's, which come from the SDK, are the same."""
+"""The emulator's control tables equal the driver's, which are from the SDK."""
 
 import pytest
 
 from dynamixel_emulator.models import BAUD_RATES, MODELS
 from paramove.robots.dynamixel.bus import servo_models as driver
 
-LEFT_TO_THE_EMULATOR = {"Backup Ready"}
+ONLY_IN_THE_EMULATOR = {"Backup Ready"}
 
 
 def test_both_know_the_same_models_and_baud_rates() -> None:
@@ -18,7 +18,7 @@ def test_registers_and_facts_of_a_model_are_the_same(name: str) -> None:
     ours, theirs = MODELS[name], driver.MODELS[name]
     registers = {one.name: (one.address, one.size, one.signed) for one in ours.registers.values()}
     known = {one.name: (one.address, one.size, one.signed) for one in theirs.registers.values()}
-    assert {name: place for name, place in registers.items() if name not in LEFT_TO_THE_EMULATOR} == known
+    assert {name: row for name, row in registers.items() if name not in ONLY_IN_THE_EMULATOR} == known
     facts = ("number", "modes", "top_speed", "voltage", "stall_torque", "stall_amperes", "current_unit")
     assert {fact: getattr(ours, fact) for fact in facts} == {fact: getattr(theirs, fact) for fact in facts}
     limits = tuple(0.1 * ours.registers[f"{end} Voltage Limit"].initial for end in ("Min", "Max"))

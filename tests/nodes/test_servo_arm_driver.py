@@ -177,7 +177,7 @@ def test_a_movement_of_a_program_that_is_killed_is_played_to_its_end_and_nothing
     assert {one.trajectory_id for one in run.statuses} == {"of a program"}
     assert run.goals() == list(ROBOT.units.to_counts(there()))
     before = len(run.statuses)
-    packets = run.emulator.bus.judge.packets
-    run.hears_until(lambda: run.emulator.bus.judge.packets > packets + 50)
+    packets = run.emulator.bus.checker.packets
+    run.hears_until(lambda: run.emulator.bus.checker.packets > packets + 50)
     assert len(run.statuses) == before
     assert run.goals() == list(ROBOT.units.to_counts(there()))

@@ -32,12 +32,12 @@ def test_there_is_a_port_and_a_control_socket_while_it_runs(tmp_path):
     port = "by-id/usb-paramove_emulated_servos-if00-port0"
     assert bus.seen == [{"by-id", port, "control"}] * 3
     assert not (tmp_path / port).exists()
-    assert bus.states[0] == ("ready", f"open_manipulator_x at {tmp_path / port}; 0 packets, nothing wrong")
-    said = bus.published_on(topics.TRUTH_STATE)
-    assert [word.message.time_ns for word in said] == [PERIOD_NS, 2 * PERIOD_NS, 3 * PERIOD_NS]
-    assert len(said[0].message.joint_positions) == 5
+    assert bus.states[0] == ("ready", f"open_manipulator_x at {tmp_path / port}; 0 packets, no findings")
+    published = bus.published_on(topics.TRUTH_STATE)
+    assert [word.message.time_ns for word in published] == [PERIOD_NS, 2 * PERIOD_NS, 3 * PERIOD_NS]
+    assert len(published[0].message.joint_positions) == 5
 
 
-def test_a_robot_without_servos_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no arm of servos"):
+def test_a_robot_without_servos_is_rejected(tmp_path):
+    with pytest.raises(InputError, match="not a servo arm"):
         dynamixel_emulator.run(RecordedBus(run_folder=tmp_path), dynamixel_emulator.Config(robot=ROBOTS / "hoap3"))

@@ -1,4 +1,4 @@
-"""Replies of a servo bus with a sound checksum that are not true."""
+"""Injected replies of a servo bus with a valid checksum and wrong content."""
 
 from dataclasses import replace
 
@@ -17,35 +17,37 @@ class OneAsTheNext(WireFaults):
         super().__init__()
         self.each, self.exchanges = each, 0
 
-    def told(self, question: bytes, answers: Replies) -> Replies:
-        if len(answers) < 2:
-            return answers
+    def apply(self, request: bytes, replies: Replies) -> Replies:
+        if len(replies) < 2:
+            return replies
         self.exchanges += 1
         if self.exchanges % self.each:
-            return answers
-        place = self.exchanges // self.each % (len(answers) - 1)
-        delay_s, answer = answers[place]
-        foreign = replace(decoded(answer), id=decoded(answers[place + 1][1]).id)
-        return [*answers[:place], (delay_s, encoded(foreign)), *answers[place + 2 :]]
+            return replies
+        index = self.exchanges // self.each % (len(replies) - 1)
+        delay_s, reply = replies[index]
+        foreign = replace(decoded(reply), id=decoded(replies[index + 1][1]).id)
+        return [*replies[:index], (delay_s, encoded(foreign)), *replies[index + 2 :]]
 
 
 class OneElsewhere(WireFaults):
-    """Once, the position of one servo is by so many pulses another."""
+    """Once, the reported position of one servo is offset by this number of pulses."""
 
     def __init__(self, number: int, pulses: int) -> None:
         super().__init__()
         self.number, self.pulses = number, pulses
 
-    def told(self, question: bytes, answers: Replies) -> Replies:
-        if decoded(question).parameters[:2] != POSITION.address.to_bytes(2, "little"):
-            return answers
-        return [(delay_s, self._moved(answer)) for delay_s, answer in answers]
+    def apply(self, request: bytes, replies: Replies) -> Replies:
+        if decoded(request).parameters[:2] != POSITION.address.to_bytes(2, "little"):
+            return replies
+        return [(delay_s, self._offset(reply)) for delay_s, reply in replies]
 
-    def _moved(self, answer: bytes) -> bytes:
-        packet = decoded(answer)
+    def _offset(self, reply: bytes) -> bytes:
+        packet = decoded(reply)
         if packet.id != self.number or not self.pulses:
-            return answer
+            return reply
         error, data, rest = packet.parameters[:1], packet.parameters[1:5], packet.parameters[5:]
-        moved = int.from_bytes(data, "little", signed=True) + self.pulses
+        position = int.from_bytes(data, "little", signed=True) + self.pulses
         self.pulses = 0
-        return encoded(Packet(packet.id, packet.instruction, error + moved.to_bytes(4, "little", signed=True) + rest))
+        return encoded(
+            Packet(packet.id, packet.instruction, error + position.to_bytes(4, "little", signed=True) + rest)
+        )

@@ -146,8 +146,8 @@ def test_logic_that_hangs_while_the_loop_lives_ends_in_the_stop_ramp(emulator):
         with loop.lock:
             tick, loop._tick = loop._tick, lambda now_ns: None
         person.hears_until(lambda: loop._reader.at_rest)
-        rested, packets = memory(emulator, "Goal Position"), emulator.bus.judge.packets
-        person.hears_until(lambda: emulator.bus.judge.packets > packets + 20)
+        rested, packets = memory(emulator, "Goal Position"), emulator.bus.checker.packets
+        person.hears_until(lambda: emulator.bus.checker.packets > packets + 20)
         assert memory(emulator, "Goal Position") == rested
         assert memory(emulator, "Bus Watchdog")[0] not in (0, TRIPPED), "the loop still talks to the servos"
         with loop.lock:
