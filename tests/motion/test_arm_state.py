@@ -65,6 +65,18 @@ def test_finds_nothing_too_early_while_moving_or_when_stale(robot) -> None:
     assert state.estimate_pose(now_ns)
 
 
+@each_robot
+@pytest.mark.parametrize(("opening", "holds"), [(0.4, True), (0.0, False), (0.9, False)])
+def test_a_gripper_that_rests_where_objects_stop_it_is_taken_to_be_closed_on_one(robot, opening, holds) -> None:
+    arm = GripperArm.of(robot, "right")
+    angles = away(arm)
+    angles[-1] = arm.closed + opening * (arm.opened - arm.closed)
+    state, now_ns = after(arm, np.repeat(angles[None], 20, axis=0))
+    assert state.estimate_pose(now_ns)
+    assert state.opening == pytest.approx(0.0 if holds else opening, abs=1e-9)
+    assert (state.opening < arm.felt_opening < state.measured) == holds
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 def test_what_is_no_angle_counts_for_nothing(bad: float) -> None:
     state, now_ns = after(KOCH, np.repeat(away(KOCH)[None], 20, axis=0))

@@ -87,6 +87,8 @@ def test_unknown_joint_names_the_nearest() -> None:
             "different angles of the open",
         ),
         ("    joints: [right_shoulder_pitch, ", "    joints: [", r"arms\.right\.joints\.4 is missing"),
+        ("holding_openings: [0.36, 0.5]", "holding_openings: [0.5, 0.36]", "found 0.5 and 0.36"),
+        ("felt_opening: 0.12", "felt_opening: 1.2", "felt_opening"),
         ("    upper_arm: 0.110\n", "", r"arms\.right\.upper_arm is missing"),
         ("name: right_knee,", "name: right_kn,", "model file .* does not exist"),
     ],

@@ -11,8 +11,6 @@ from paramove.documents import Floats
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.planned_motion import PlannedMotion, RestPose
 
-FELT_OPENING = 0.12  # a closed gripper that stops at a wider opening than this holds something
-GRIPPING_OPENINGS = (0.36, 0.5)  # where fingers rest on an object; at the base pose they are at 0.3, open hands wider
 REST_NS = 1_000_000_000  # a grasp pauses the arm for up to 0.8 s
 STALE_NS = 500_000_000
 MAX_ANGLE = 2.0 * np.pi
@@ -97,8 +95,9 @@ class ArmState:
         self.known = True
         self.pose = None if at_base else RestPose(angles, self._arm.position(angles), measured=True)
         self.opening = self._arm.opening_of(float(self._arm.base_angles[-1] if at_base else angles[-1]))
-        if not at_base and GRIPPING_OPENINGS[0] < self.opening < GRIPPING_OPENINGS[1]:
-            self.opening = 0.0  # an object holds the fingers open there
+        low, high = self._arm.holding_openings
+        if not at_base and low < self.opening < high:
+            self.opening = 0.0  # an object holds the gripper open there
         return True
 
     def _rests(self) -> bool:

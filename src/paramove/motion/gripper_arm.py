@@ -22,6 +22,8 @@ class GripperArm:
         base_angles: Of the base pose.
         resolution: One unit of each joint's servo, [J + 1], rad.
         opened, closed: Angles of the gripper for ξ = 1 and ξ = 0.
+        felt_opening: Commanded to close, the gripper holds something if it stops at a wider opening ξ than this.
+        holding_openings: ξ at which it stops on objects.
         end_effector: Position [..., 3], m, of the end effector for angles [..., J] of the arm's joints.
     """
 
@@ -31,6 +33,8 @@ class GripperArm:
     resolution: Floats
     opened: float
     closed: float
+    felt_opening: float
+    holding_openings: tuple[float, float]
     end_effector: Callable[[Floats], Floats]
 
     @classmethod
@@ -40,6 +44,7 @@ class GripperArm:
         if chain is not None:
             joints, frame = (*chain.joints, chain.gripper), ARM_BASE
             opened, closed = chain.gripper_open, chain.gripper_closed
+            felt, holding = chain.felt_opening, chain.holding_openings
             kinematics = chain.kinematics
 
             def end_effector(angles: Floats) -> Floats:
@@ -49,13 +54,15 @@ class GripperArm:
             arm = robot.arm(side)
             joints, frame = (*arm.joints, arm.fingers), f"{side}_shoulder"
             opened, closed = arm.fingers_open, arm.fingers_closed
+            felt, holding = arm.felt_opening, arm.holding_openings
 
             def end_effector(angles: Floats) -> Floats:
                 return arm.kinematics.forward(angles).gripper
 
         indices = robot.indices(joints)
         resolution: Floats = 1.0 / np.abs(robot.units.counts_per_rad[indices])
-        return cls(joints, frame, robot.base_pose[indices], resolution, opened, closed, end_effector)
+        base_angles = robot.base_pose[indices]
+        return cls(joints, frame, base_angles, resolution, opened, closed, felt, holding, end_effector)
 
     def opening_of(self, angle: float) -> float:
         """ξ of an angle of the gripper, clipped to 0 … 1."""

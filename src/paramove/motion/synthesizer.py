@@ -13,7 +13,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
-from paramove.motion.arm_state import FELT_OPENING, ArmState
+from paramove.motion.arm_state import ArmState
 from paramove.motion.planned_motion import PlannedMotion, RestPose, motion_message
 from paramove.motion.plans import MotionPlans, NoPlanError
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
@@ -106,7 +106,7 @@ class Synthesizer:
     @property
     def holding(self) -> bool:
         """Whether the hand is commanded to be closed and its fingers feel something."""
-        return self._commanded_opening() < FELT_OPENING < self._hand.measured
+        return self._commanded_opening() < self._arm.felt_opening < self._hand.measured
 
     @property
     def detail(self) -> str:
@@ -140,7 +140,7 @@ class Synthesizer:
             return
         running = self._running
         if running is not None and running.motion is not None and self._should_hold(running.motion, running.time_s):
-            self._hand.lost |= self._hand.measured <= FELT_OPENING
+            self._hand.lost |= self._hand.measured <= self._arm.felt_opening
 
     def on_trajectory_status(self, status: TrajectoryStatus) -> None:
         """Updates with the driver's progress in the current motion."""

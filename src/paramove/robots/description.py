@@ -44,6 +44,7 @@ class Arm:
         indices: Their indices in the robot's joint vector.
         fingers: Name of the joint that closes the hand; `fingers_index` its index.
         fingers_open, fingers_closed: Angles of the open (xi = 1) and the closed hand (xi = 0), rad.
+        felt_opening, holding_openings: How a held object is detected: see `FingersPart`.
         kinematics: Forward kinematics in the frame of the shoulder site.
     """
 
@@ -53,6 +54,8 @@ class Arm:
     fingers_index: int
     fingers_open: float
     fingers_closed: float
+    felt_opening: float
+    holding_openings: tuple[float, float]
     sites: ArmSites
     kinematics: ArmKinematics
 
@@ -72,6 +75,7 @@ class Chain:
         indices: Their indices in the robot's joint vector.
         gripper: Name of the joint that closes the gripper; `gripper_index` its index.
         gripper_open, gripper_closed: Its angles, rad.
+        felt_opening, holding_openings: How a held object is detected: see `FingersPart`.
         grip_current_ma: With which it holds an object; None: its servo has no such mode.
         kinematics: Within the robot's soft limits; in the frame of the base site.
     """
@@ -82,6 +86,8 @@ class Chain:
     gripper_index: int
     gripper_open: float
     gripper_closed: float
+    felt_opening: float
+    holding_openings: tuple[float, float]
     grip_current_ma: float | None
     sites: ChainSites
     kinematics: PlanarArm
@@ -249,6 +255,8 @@ def _arm(names: tuple[str, ...], arm: ArmPart) -> Arm:
         fingers_index=names.index(arm.fingers.joint),
         fingers_open=float(np.deg2rad(arm.fingers.open_deg)),
         fingers_closed=float(np.deg2rad(arm.fingers.closed_deg)),
+        felt_opening=arm.fingers.felt_opening,
+        holding_openings=arm.fingers.holding_openings,
         sites=arm.sites,
         kinematics=ArmKinematics(arm.upper_arm, arm.gripper_from_elbow, arm.fingertip_from_elbow),
     )
@@ -264,6 +272,8 @@ def _chain(names: tuple[str, ...], chain: ChainPart, lower: Floats, upper: Float
         gripper_index=names.index(chain.gripper.joint),
         gripper_open=float(np.deg2rad(chain.gripper.open_deg)),
         gripper_closed=float(np.deg2rad(chain.gripper.closed_deg)),
+        felt_opening=chain.gripper.felt_opening,
+        holding_openings=chain.gripper.holding_openings,
         grip_current_ma=chain.gripper.grip_current_ma,
         sites=chain.sites,
         kinematics=PlanarArm(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from paramove.documents import InputError, findings, read_document
 from paramove.workspace import Workspace
@@ -70,12 +70,30 @@ class StreamParameters(_Part):
     start_tolerance_deg: float = Field(gt=0)
 
 
+Opening = Annotated[float, Field(ge=0.0, le=1.0)]
+"""ξ: 0 closed, 1 open."""
+
+
 class FingersPart(_Part):
-    """The joint that closes a hand or a gripper."""
+    """The joint that closes a hand or a gripper.
+
+    `felt_opening`: commanded to close, it holds something if it stops at a wider opening than this. `holding_openings`:
+    where it stops on objects; an arm that is found at rest with such an opening, away from its base pose, is taken to
+    hold one.
+    """
 
     joint: str
     open_deg: float
     closed_deg: float
+    felt_opening: Opening = 0.12
+    holding_openings: tuple[Opening, Opening] = (0.05, 0.55)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        low, high = self.holding_openings
+        if low >= high:
+            raise ValueError(f"expected holding_openings from a smaller to a larger one, found {low} and {high}")
+        return self
 
 
 class GripperPart(FingersPart):
