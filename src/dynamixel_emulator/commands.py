@@ -67,11 +67,14 @@ def _emulate(words: list[str]) -> int:
         from dynamixel_emulator.world import MujocoMechanics  # MuJoCo is needed only for a world
 
         mechanics = MujocoMechanics(options.world, joints)
+    servos = chain.emulated()
+    if not options.port.absolute().parent.is_dir():
+        raise EmulatorError(f"there is no folder for the port {options.port}: create it", missing=True)
     stop_signals = {signal.SIGINT, signal.SIGTERM}
-    signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals)
-    emulator = DynamixelEmulator(chain.emulated(), options.port, mechanics, options.servo_rules_only)
     with contextlib.ExitStack() as opened:
-        opened.enter_context(emulator)
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals)
+        opened.callback(signal.pthread_sigmask, signal.SIG_SETMASK, mask)
+        emulator = opened.enter_context(DynamixelEmulator(servos, options.port, mechanics, options.servo_rules_only))
         faults = FaultCommands(emulator, chain.numbers, dict(zip(chain.numbers.values(), joints, strict=True)))
         opened.enter_context(ControlSocket(control_of(options.port), faults.do))
         sys.stdout.write(

@@ -86,6 +86,7 @@ def test_servos_by_model_and_id_a_baud_rate_and_a_world(tmp_path: Path) -> None:
         (("xl430_w250:999",), UNUSABLE, ("xl430_w250:999", "0 to 252")),
         (("koch", "--baud-rate", "1234"), UNUSABLE, ("1234", "57600")),
         (("koch", "--world", "no.xml"), MISSING, ("no.xml",)),
+        (("koch", "--port", "no/folder"), MISSING, ("no/folder",)),
         (("fault", "unplug"), MISSING, ("dynamixel-port.control",)),
         (("status",), MISSING, ("dynamixel-port.control",)),
     ],
@@ -99,7 +100,9 @@ def test_an_error_message_names_what_is_valid(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     assert main(arguments) == code
+    assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == before
     message = capsys.readouterr().err
     for fact in facts:
         assert fact in message
