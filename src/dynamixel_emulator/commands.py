@@ -68,8 +68,6 @@ def _emulate(words: list[str]) -> int:
 
         mechanics = MujocoMechanics(options.world, joints)
     servos = chain.emulated()
-    if not options.port.absolute().parent.is_dir():
-        raise EmulatorError(f"there is no folder for the port {options.port}: create it", missing=True)
     stop_signals = {signal.SIGINT, signal.SIGTERM}
     with contextlib.ExitStack() as opened:
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals)

@@ -58,7 +58,7 @@ class DynamixelEmulator:
             goal, which are common in third-party programs.
 
     Raises:
-        EmulatorError: The path of the link is another file, or another emulator serves it.
+        EmulatorError: The path of the link is another file, its folder is missing, or another emulator serves it.
 
     Attributes:
         faults: Communication faults; may be replaced at any time.
@@ -221,6 +221,8 @@ def _set_priority(real_time: bool) -> None:
 
 def _claim(link: Path) -> socket.socket:
     """Reserves this link for one emulator on this machine, until the socket is closed or the program ends."""
+    if not link.absolute().parent.is_dir():
+        raise EmulatorError(f"there is no folder for the port {link}: create it", missing=True)
     claim = socket.socket(socket.AF_UNIX)
     name = hashlib.sha256(os.fsencode(link.absolute())).hexdigest()
     try:

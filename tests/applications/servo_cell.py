@@ -89,7 +89,7 @@ class ServoCell:
     def _measured(self) -> JointStates:
         angles, arm = self.angles.copy(), self.plan.arm
         if self.graspable and arm.opening_of(float(angles[-1])) < 0.01:
-            angles[-1] = arm.closed + HELD_OPENING * (arm.opened - arm.closed)
+            angles[-1] = arm.angle_of(HELD_OPENING)
         return JointStates(
             joints=[JointState(name=name, position=angle) for name, angle in zip(arm.joints, angles, strict=True)]
         )

@@ -2,8 +2,10 @@
 
 import pytest
 
+from dynamixel_emulator.arms import ARMS
 from dynamixel_emulator.models import BAUD_RATES, MODELS
 from paramove.robots.dynamixel.bus import servo_models as driver
+from tests.robots.servo_arms import ARMS as DESCRIBED
 
 ONLY_IN_THE_EMULATOR = {"Backup Ready"}
 
@@ -26,3 +28,13 @@ def test_registers_and_facts_of_a_model_are_the_same(name: str) -> None:
     allowed = ours.registers["Baud Rate"].allowed
     assert allowed == (0, len(theirs.baud_rates) - 1)
     assert ours.registers["ID"].allowed == (0, driver.MAX_ID)
+
+
+@pytest.mark.parametrize("robot", DESCRIBED, ids=lambda robot: robot.name)
+def test_an_arm_by_name_is_the_one_that_its_robot_description_has(robot) -> None:
+    (chain,) = (one for name, one in ARMS.items() if robot.name.startswith(name))
+    assert chain.servos == tuple(zip(robot.motors, robot.servo_ids, robot.joint_names, strict=True))
+    assert chain.baud_rate == robot.bus.baud_rate
+    joints = [(one.name, one.zero_counts) for one in chain.joints()]
+    assert joints == list(zip(robot.joint_names, robot.units.zero_counts, strict=True))
+    assert [abs(one.counts_per_rad) for one in chain.joints()] == pytest.approx(abs(robot.units.counts_per_rad))

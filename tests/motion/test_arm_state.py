@@ -70,7 +70,7 @@ def test_finds_nothing_too_early_while_moving_or_when_stale(robot) -> None:
 def test_a_gripper_that_rests_where_objects_stop_it_is_taken_to_be_closed_on_one(robot, opening, holds) -> None:
     arm = GripperArm.of(robot, "right")
     angles = away(arm)
-    angles[-1] = arm.closed + opening * (arm.opened - arm.closed)
+    angles[-1] = arm.angle_of(opening)
     state, now_ns = after(arm, np.repeat(angles[None], 20, axis=0))
     assert state.estimate_pose(now_ns)
     assert state.opening == pytest.approx(0.0 if holds else opening, abs=1e-9)

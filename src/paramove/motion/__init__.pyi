@@ -1,5 +1,4 @@
 from .arm_pose import ArmPoseSolver as ArmPoseSolver
-from .clear_plans import ClearPlans as ClearPlans
 from .conversion import RobotMovement as RobotMovement
 from .gripper_arm import GripperArm as GripperArm
 from .hand_poses import FARTHEST_M as FARTHEST_M
@@ -7,7 +6,6 @@ from .hand_poses import metres as metres
 from .planned_motion import PlannedMotion as PlannedMotion
 from .planned_motion import RelocationOptions as RelocationOptions
 from .planned_motion import RestPose as RestPose
-from .planned_motion import motion_message as motion_message
 from .plans import MotionPlans as MotionPlans
 from .plans import NoPlanError as NoPlanError
 from .reaching_movement import ArmPoses as ArmPoses

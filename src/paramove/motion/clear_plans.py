@@ -102,23 +102,19 @@ class ClearPlans:
         """
         if not here.measured:
             return self.leave(here, opening, standing)
-        return self._home_from_measured(here.angles, here.gripper, holding, standing)
-
-    def _home_from_measured(self, angles: Floats, here: Floats, holding: bool, standing: Floats) -> PlannedMotion:
-        planner = self.planner
-        span = planner.arm.fingers_open - planner.arm.fingers_closed
-        opening = 0.0 if holding else float(np.clip((angles[5] - planner.arm.fingers_closed) / span, 0.0, 1.0))
-        start = np.array([*angles[:5], planner.arm.fingers_angle(opening)])
+        planner, hand = self.planner, here.gripper
+        opening = 0.0 if holding else self.arm.opening_of(float(here.angles[-1]))
+        start = np.array([*here.angles[:-1], self.arm.angle_of(opening)])
         grasped = self._checker.grasp_height
-        below = np.array([here[0], here[1], min(here[2], grasped)])
-        put_down: list[_Alternative] = [partial(planner.deliver, here, below, [], upward) for upward in (False, True)]
-        leave: list[_Alternative] = [partial(planner.leave, here, opening, upward) for upward in (False, True)]
+        below = np.array([hand[0], hand[1], min(hand[2], grasped)])
+        put_down: list[_Alternative] = [partial(planner.deliver, hand, below, [], upward) for upward in (False, True)]
+        leave: list[_Alternative] = [partial(planner.leave, hand, opening, upward) for upward in (False, True)]
         learned = [
             partial(self._from, start, alternative, holding)
             for alternative in ([*put_down, *leave] if holding else leave)
         ]
         straight = partial(self._straight, start, planner.base_angles, "retreat")
-        high = here[2] > grasped + _HIGH and not holding
+        high = hand[2] > grasped + _HIGH and not holding
         return self._first([straight, *learned] if high else [*learned, straight], standing)
 
     def _from(self, start: Floats, alternative: _Alternative, holding: bool) -> PlannedMotion:

@@ -68,6 +68,10 @@ class GripperArm:
         """ξ of an angle of the gripper, clipped to 0 … 1."""
         return float(np.clip((angle - self.closed) / (self.opened - self.closed), 0.0, 1.0))
 
+    def angle_of(self, opening: float) -> float:
+        """Angle of the gripper for an opening ξ, rad."""
+        return self.closed + opening * (self.opened - self.closed)
+
     def position(self, angles: Floats) -> Floats:
         """Position of the end effector [..., 3], m, for angles [..., J + 1]."""
         return self.end_effector(angles[..., :-1])

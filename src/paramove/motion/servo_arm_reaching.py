@@ -70,8 +70,7 @@ class ServoArmReaching:
         chain = description.chain
         if chain is None:
             raise DescriptionError(f"{description.name} has no chain in its robot.yaml: it is not a servo arm")
-        self._chain, self._arm = chain, chain.kinematics
-        self.arm = GripperArm.of(description, "")
+        self._arm, self.arm = chain.kinematics, GripperArm.of(description, "")
         self.options = o = options or ServoReachingOptions()
         self.offer_opening, self.closed_opening = o.work_opening, o.closed_opening
         indices = [*chain.indices, chain.gripper_index]
@@ -83,7 +82,7 @@ class ServoArmReaching:
         self.start_tolerance = float(np.deg2rad(description.stream.start_tolerance_deg))
         self._period = description.stream.period_us * 1e-6
         self._clearance = TableClearance(description, chain, o.table_z, cylinder)
-        self._poses = HandPoses(chain, self._clearance, self._gripper(o.work_opening))
+        self._poses = HandPoses(chain, self._clearance, self.arm.angle_of(o.work_opening))
         length = float(np.hypot(*self._arm.upper_arm) + np.hypot(*self._arm.forearm) + self._arm.hand[0])
         middle = self._poses.middle(o.table_z, self._band(o.grasp_band_deg))
         self._person = PlacedPerson(robot_movement(model, length), middle, self._arm.yaw_axis, POINTS)
@@ -146,7 +145,7 @@ class ServoArmReaching:
         """Open the gripper where it is, draw it up, go back to the base pose. Errors as for `reach`."""
         motion = self._begun(here, standing)
         self._fingers(motion, "release", self.options.work_opening)
-        self._home(motion, "retreat", self._hand(motion.end))
+        self._home(motion, "retreat", self.arm.position(motion.end))
         return self._finished(motion)
 
     def home(
@@ -154,7 +153,7 @@ class ServoArmReaching:
     ) -> PlannedMotion:
         """Back to the base pose, by the learned retreat; a held object is put down first. Errors as for `reach`."""
         motion = self._begun(here, standing)
-        hand = self._hand(motion.end)
+        hand = self.arm.position(motion.end)
         if holding:
             below = np.array([*hand[:2], min(hand[2], self.options.table_z + self.options.grasp_height)])
             self._put(motion, below, self._grasp_pitch(below))
@@ -187,7 +186,7 @@ class ServoArmReaching:
         base = self.base_angles
         path = self._learned(self._person.retreat, from_point)
         pitch = float(self._arm.forward(base[:-1]).pitch)
-        self._go(motion, name, self._hand(base), pitch, path, None, self.options.clearance)
+        self._go(motion, name, self.arm.position(base), pitch, path, None, self.options.clearance)
         self._joints(motion, name, base)
 
     def _go(
@@ -213,7 +212,9 @@ class ServoArmReaching:
             if best is not None and self._period * len(best) <= self.options.longest_duration:
                 break
         if best is None:
-            raise motion.no_plan(f"there is no path to {metres(point)} from {metres(self._hand(motion.end))}: {reason}")
+            raise motion.no_plan(
+                f"there is no path to {metres(point)} from {metres(self.arm.position(motion.end))}: {reason}"
+            )
         motion.add(name, best, holding)
 
     def _clear(
@@ -242,7 +243,7 @@ class ServoArmReaching:
 
     def _line(self, motion: MotionRows, name: str, point: Floats, pitch: float, holding: bool = False) -> None:
         """Straight, with the gripper as it is."""
-        here = self._hand(motion.end)
+        here = self.arm.position(motion.end)
         distance = float(np.linalg.norm(point - here))
         n = max(6, int(np.ceil(distance / 0.004)))
         positions = here + np.linspace(0.0, 1.0, n)[:, None] * (point - here)
@@ -259,7 +260,7 @@ class ServoArmReaching:
         motion.add(name, rows, holding)
 
     def _fingers(self, motion: MotionRows, name: str, opening: float) -> None:
-        end = np.append(motion.end[:-1], self._gripper(opening))
+        end = np.append(motion.end[:-1], self.arm.angle_of(opening))
         closing = opening == self.options.closed_opening
         knots = np.linspace(motion.end, end, 6)
         rows = rest_to_rest(knots, self.options.gripper_duration, self._period, self._limits)
@@ -290,7 +291,7 @@ class ServoArmReaching:
         if opening == self.options.closed_opening:
             return np.full(POINTS, start[-1])
         last = max(float(path.opening[-1]), 1e-3)
-        angles = np.array([self._gripper(opening * float(np.clip(xi / last, 0.0, 1.0))) for xi in path.opening])
+        angles = np.array([self.arm.angle_of(opening * float(np.clip(xi / last, 0.0, 1.0))) for xi in path.opening])
         return smoothed(angles + (1.0 - fraction) * (start[-1] - angles[0]), SMOOTHING)
 
     def _fault(self, motion: MotionRows, rows: Floats, clearance: float, holding: bool) -> str:
@@ -336,7 +337,7 @@ class ServoArmReaching:
         rows = np.concatenate(motion.rows)
         phases = tuple((name, self._period * first) for name, first in motion.phases)
         times: Floats = self._period * np.arange(len(rows), dtype=np.float64)
-        return PlannedMotion(times, rows, self._hand(rows), np.concatenate(motion.holding), phases, 0.0)
+        return PlannedMotion(times, rows, self.arm.position(rows), np.concatenate(motion.holding), phases, 0.0)
 
     def _learned(self, path: Callable[[Floats], LearnedPath], target: Floats) -> LearnedPath:
         try:
@@ -350,12 +351,6 @@ class ServoArmReaching:
     def _above(self, point: Floats, pitch: float) -> tuple[Floats, float]:
         above = point + self.options.lift * _UP
         return above, self._poses.pitch_at(above, pitch, self._band(self.options.reach_band_deg))
-
-    def _hand(self, angles: Floats) -> Floats:
-        return self._arm.forward(angles[..., :-1]).position
-
-    def _gripper(self, opening: float) -> float:
-        return self._chain.gripper_closed + opening * (self._chain.gripper_open - self._chain.gripper_closed)
 
     def _inside(self, angles: Floats) -> Floats:
         return np.asarray(np.clip(angles, self.lower, self.upper))
