@@ -38,8 +38,9 @@ from paramove.robots import RobotDescription
 from paramove.runs import seeds_of
 from sim import looks, places, scene, tool_box
 from sim.camera import Eye, Sensor
+from sim.hand import FROM_ABOVE
 from sim.hand_path import minimum_jerk
-from sim.instructor import FROM_ABOVE, SHOWN_LIFT
+from sim.instructor import SHOWN_LIFT
 from sim.looks import Looks
 from sim.simulation import CAMERA_HZ
 from sim.tool_box import NOMINAL, Measures

@@ -15,25 +15,20 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # the workspace is no installed package
 
 from paramove.msgs.rule_pb2 import Speech
-from paramove.robots import RobotDescription
-from sim import scene, truth
-from sim.simulation import Simulation
+from sim.scenes import SceneOptions, at_the_tool_box
 
 PERIOD_MS = 1000 / 15
 
 
 def measure(ticks: int, camera: bool, video: bool) -> tuple[float, float]:
     """Milliseconds per tick of physics and of rendering while the instructor shows the rules."""
-    simulation = Simulation(0, RobotDescription.load(scene.ROBOT_MODEL.parent), camera, video)
-    simulation.instructor.handle(Speech.REQUEST_SHOW_RULES)
+    simulation = at_the_tool_box(SceneOptions(camera=camera, video=video))
+    simulation.person.handle(Speech.REQUEST_SHOW_RULES)
     simulation.run_to_tick(1)
-    simulation.image_raw()
-    simulation.view()
+    simulation.shown()
     simulation.physics_s = simulation.rendering_s = 0.0
     for tick in range(2, ticks + 2):
-        simulation.image_raw()
-        simulation.view()
-        truth.state(simulation)
+        simulation.shown()
         simulation.run_to_tick(tick)
     simulation.close()
     return 1e3 * simulation.physics_s / ticks, 1e3 * simulation.rendering_s / ticks

@@ -5,14 +5,17 @@ Poses are in the table frame of `sim.small_person`, in which they are calibrated
 
 from __future__ import annotations
 
-import cv2
+from collections.abc import Iterator
+
 import mujoco
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
+from paramove.bus import topics
+from paramove.bus.topics import Topic
 from paramove.cameras import CalibratedCamera
-from paramove.documents import Floats, Image
-from sim.camera import Eye
+from paramove.documents import Floats
+from sim.camera import Eye, raw_image, with_noise
 from sim.human import camera_frame
 from sim.performances import Lens
 from sim.performances_scene import (
@@ -73,13 +76,14 @@ def add_arm_cameras(spec: mujoco.MjSpec, world_from_shoulder: Floats, cameras: t
 
 
 class ArmCameras:
-    """What falls on the cameras' sensors. Holds a graphics context: use it in one thread and `close` it.
+    """What falls on the cameras' sensors; see `ImageSource`.
 
     Args:
         model: With the cameras in it.
         cameras: As they really are.
         noise: Standard deviation of the sensors' noise, of 255.
         draw: Of the noise.
+        every: They give an image in every so many ticks.
     """
 
     def __init__(
@@ -88,33 +92,16 @@ class ArmCameras:
         cameras: tuple[CalibratedCamera, ...],
         noise: float,
         draw: np.random.Generator,
+        every: int = 1,
     ) -> None:
-        self._cameras = cameras
+        self._lenses = {camera.name: Lens(camera) for camera in cameras}
         self._eye = Eye(model, *RENDERED_PX)
-        self._lenses = [Lens(camera) for camera in cameras]
-        self._noise, self._draw = noise, draw
+        self._noise, self._draw, self._every = noise, draw, every
+        self.close = self._eye.close
 
-    def images(self, data: mujoco.MjData) -> list[Image]:
-        """One RGB image [240, 320, 3] of each camera."""
-        images = []
-        for camera, lens in zip(self._cameras, self._lenses, strict=True):
-            image = lens.image(self._eye.look(data, camera.name))
-            noise = self._draw.normal(0.0, self._noise, image.shape).round().astype(np.int8)
-            images.append(np.asarray(cv2.add(image, noise, dtype=cv2.CV_8U), dtype=np.uint8))
-        return images
-
-    def images_raw(self, data: mujoco.MjData, now_ns: int) -> list[RawImage]:
-        """The same as messages."""
-        messages = []
-        for camera, image in zip(self._cameras, self.images(data), strict=True):
-            message = RawImage(
-                frame_id=camera.name, width=WIDTH_PX, height=HEIGHT_PX, encoding="rgb8", step=3 * WIDTH_PX,
-                data=np.ascontiguousarray(image).tobytes(),
-            )  # fmt: skip
-            message.timestamp.FromNanoseconds(now_ns)
-            messages.append(message)
-        return messages
-
-    def close(self) -> None:
-        """Gives the graphics context back."""
-        self._eye.close()
+    def images(self, data: mujoco.MjData, tick: int, now_ns: int) -> Iterator[tuple[Topic, RawImage]]:
+        """See `ImageSource.images`; RGB [240, 320, 3] each."""
+        if tick % self._every == 0:
+            for topic, (name, lens) in zip(topics.STEREO_IMAGES_RAW, self._lenses.items(), strict=True):
+                exposed = with_noise(lens.image(self._eye.look(data, name)), self._noise, self._draw)
+                yield topic, raw_image(exposed, name, now_ns)

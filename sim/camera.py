@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from importlib import import_module
+from typing import Protocol
 
 import cv2
 import mujoco
 import numpy as np
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from numpy.typing import NDArray
 
+from paramove.bus import topics
+from paramove.bus.topics import Topic
 from paramove.diagnosis import graphics_backend
 from paramove.documents import Image
 from sim import looks, scene
-from sim.looks import Camera
+from sim.looks import Camera, Looks
 
 NOISE_IMAGES = 8
 
@@ -99,6 +104,64 @@ class Sensor:
         start = int(self._draw.integers(bent.size))
         noise = self._noise[number, start : start + bent.size].reshape(self._shape)
         return np.asarray(cv2.add(bent, noise, dtype=cv2.CV_8U), dtype=np.uint8)
+
+
+class ImageSource(Protocol):
+    """Cameras in a world. Holds a graphics context: use it in one thread and `close` it."""
+
+    def images(self, data: mujoco.MjData, tick: int, now_ns: int) -> Iterator[tuple[Topic, RawImage]]:
+        """What they see now, each with its topic."""
+
+    def close(self) -> None:
+        """Gives the graphics context back."""
+
+
+class RobotCamera:
+    """The camera that looks at the robot's working area; see `ImageSource`.
+
+    Args:
+        model: With the camera in it.
+        world_looks: Its lens, and its noise.
+        draw: Of the noise.
+    """
+
+    def __init__(self, model: mujoco.MjModel, world_looks: Looks, draw: np.random.Generator) -> None:
+        self._eye = Eye(model, *scene.RENDERED_PX)
+        self._sensor = Sensor(world_looks.camera, world_looks.pixel_noise, draw)
+        self.close = self._eye.close
+
+    def images(self, data: mujoco.MjData, tick: int, now_ns: int) -> Iterator[tuple[Topic, RawImage]]:
+        """See `ImageSource.images`."""
+        exposed = self._sensor.expose(self._eye.look(data, "camera"))
+        yield topics.CAMERA_IMAGE_RAW, raw_image(exposed, "camera_optical", now_ns)
+
+
+class ViewForPeople:
+    """A view of the whole scene without lens and noise; see `ImageSource`."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._eye = Eye(model, *scene.VIEW_PX)
+        self.close = self._eye.close
+
+    def images(self, data: mujoco.MjData, tick: int, now_ns: int) -> Iterator[tuple[Topic, RawImage]]:
+        """See `ImageSource.images`."""
+        yield topics.TRUTH_VIEW, raw_image(self._eye.look(data, "view"), "view", now_ns)
+
+
+def with_noise(image: Image, deviation: float, draw: np.random.Generator) -> Image:
+    """The image with the noise of a sensor; standard deviation of 255."""
+    noise = draw.normal(0.0, deviation, image.shape).round().astype(np.int8)
+    return np.asarray(cv2.add(image, noise, dtype=cv2.CV_8U), dtype=np.uint8)
+
+
+def raw_image(image: Image, frame: str, now_ns: int) -> RawImage:
+    """An RGB image [H, W, 3] as a message."""
+    height, width = image.shape[:2]
+    message = RawImage(
+        frame_id=frame, width=width, height=height, encoding="rgb8", step=3 * width, data=image.tobytes()
+    )
+    message.timestamp.FromNanoseconds(now_ns)
+    return message
 
 
 def undistorting_map(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

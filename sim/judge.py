@@ -1,10 +1,11 @@
-"""Judge: records the truth of a simulated run and writes at its end whether the robot succeeded.
+"""Judge: records the truth of a simulated run, for the report after it, and judges while the run goes on.
 
 Subscribes  truth/layout   TruthLayout         once, latched   world
             truth/state    TruthState          15 Hz           world
+            truth/arm      TruthArm            15 Hz           table
             truth/view     foxglove.RawImage   15 Hz           if the simulator renders it
 
-Writes `truth.mcap` (the view as JPEG) and `truth.json` (the verdict, renewed every few seconds) into the run folder.
+Writes `truth.mcap` (the view as JPEG) into the run folder and, with a verdict, `truth.json`, renewed every few seconds.
 When its process is started again it goes on in `truth.2.mcap`, ….
 """
 
@@ -15,7 +16,7 @@ import json
 import logging
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -30,7 +31,7 @@ from sim.verdict import Verdict
 
 _log = logging.getLogger(__name__)
 
-SUBSCRIBES = (topics.TRUTH_LAYOUT, topics.TRUTH_STATE, topics.TRUTH_VIEW)
+SUBSCRIBES = (topics.TRUTH_LAYOUT, topics.TRUTH_STATE, topics.TRUTH_ARM, topics.TRUTH_VIEW)
 PUBLISHES = ()
 
 RENEW_STATES = 75
@@ -40,36 +41,32 @@ class Config(NodeConfig):
     """Parameters of the judge.
 
     Attributes:
-        record: Whether `truth.mcap` is written besides `truth.json`.
+        verdict: What is judged while the run goes on; None: nothing, the report after the run judges.
         jpeg_quality: Of the view's images.
     """
 
-    record: bool = True
+    verdict: Literal["rule_learning"] | None = None
     jpeg_quality: int = Field(default=88, ge=10, le=100)
 
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then write the verdict."""
     cv2.setNumThreads(1)
-    judge = Judge(bus.run_folder / "truth.json")
     path = bus.run_folder / "truth.mcap"
-    earlier = judge.recall(PartedRecording(path))
-    detail = f"goes on after {earlier} recorded states" if earlier else "waits for the truth"
+    judge = Judge(bus.run_folder / "truth.json") if config.verdict is not None else None
+    earlier = judge.recall(PartedRecording(path)) if judge is not None else 0
+    detail = f"goes on after {earlier} recorded states" if earlier else "records the truth"
     with contextlib.ExitStack() as ending:
-        recording = ending.enter_context(Recorder(bus, path, "paramove judge")) if config.record else None
-        report = bus.ready if recording is None else recording.tell
-        ending.callback(judge.write)
-        report(detail)
+        recording = ending.enter_context(Recorder(bus, path, "paramove judge"))
+        if judge is not None:
+            ending.callback(judge.write)
+        recording.tell(detail)
         for event in bus.events(*SUBSCRIBES, tick=True):
             if isinstance(event, Received):
-                if event.topic is topics.TRUTH_LAYOUT:
-                    judge.begin(event.message)
-                elif event.topic is topics.TRUTH_STATE:
-                    detail = judge.take(event.message) or detail
-                if recording is not None:
-                    view = event.topic is topics.TRUTH_VIEW
-                    recording.keep(event, compressed(event.message, config.jpeg_quality) if view else None)
-            report(detail)
+                view = event.topic is topics.TRUTH_VIEW
+                recording.keep(event, compressed(event.message, config.jpeg_quality) if view else None)
+                detail = (judge.handle(event) if judge is not None else "") or detail
+            recording.tell(detail)
 
 
 class Judge:
@@ -98,6 +95,12 @@ class Judge:
             return float(json.loads(self._path.read_text(encoding="utf-8"))["begun_monotonic_s"])
         except (OSError, ValueError, KeyError):
             return time.monotonic()
+
+    def handle(self, received: Received) -> str:
+        """Take in a message of the truth; now and then write the verdict and return it as text, else ""."""
+        if received.topic is topics.TRUTH_LAYOUT:
+            self.begin(received.message)
+        return self.take(received.message) if received.topic is topics.TRUTH_STATE else ""
 
     def begin(self, layout: Any) -> None:
         """The run's layout is known. It is published once, and again after a restart."""

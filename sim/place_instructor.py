@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -10,9 +10,11 @@ from paramove.demonstrations import table_place
 from paramove.documents import Floats
 from paramove.msgs.rule_pb2 import Speech
 from sim import tool_box
-from sim.arm_instructor import ELBOW, SHOULDER, WRIST, ArmInstructor
-from sim.instructor import Script, Step
-from sim.small_person import POINTED_ABOVE_PLANE, SCALE, table_from_shoulder
+from sim.arm import Arm
+from sim.hand import Hand, Script, Step
+from sim.person import Person
+from sim.sights import Sights, Table
+from sim.small_person import POINTED_ABOVE_PLANE, SCALE, SmallPerson, table_from_shoulder
 
 OBJECT = "yellow"
 START = (0.165, -0.02)
@@ -28,36 +30,59 @@ WITHIN_SHARE = 0.04
 """No target lies on the outermost part of the 80 x 30 cm of the table where people demonstrate pointing."""
 
 
-class PlaceInstructor(ArmInstructor):
-    """See `ArmInstructor`. After a failed recognition points at the same target again, then at another one."""
+class PlaceInstructor(Person):
+    """See `Person`. After a failed recognition points at the same target again, then at another one.
 
-    _place: Floats | None = None
-    _shown = 0
-    _stood = np.array(START)
+    Args:
+        table: The table that the person sees and moves the object on.
+        draws: Generators for `places`, `paths`.
+        body: Whose arm it is.
+        pointing: Of how the arm points each time.
+    """
 
-    def handle(self, request: int, name: str = "") -> None:
-        """See `Instructor.handle`. A request that comes while the arm withdraws is answered by pointing again."""
-        again = (request, name)
-        if request == Speech.REQUEST_POINT_AT_PLACE and self._has_pointed and again not in self._waiting:
-            self._waiting.append(again)
-        if request == Speech.REQUEST_UNSPECIFIED and self._has_pointed and self._place is not None:
-            self._stood, self._place = self._place, None  # it is understood: the object will stand there
-        super().handle(request, name)
+    arm: Arm
 
-    def _scripts(self) -> dict[int, Callable[[str], Script]]:
-        more: dict[int, Callable[[str], Script]] = {
+    def __init__(
+        self, table: Table, draws: dict[str, np.random.Generator], body: SmallPerson, pointing: np.random.Generator
+    ) -> None:
+        hand = Hand(table, Sights(table, {}), draws["paths"])
+        super().__init__(table, hand, Arm(hand, body, pointing))
+        self._places = draws["places"]
+        self._place: Floats | None = None
+        self._shown = 0
+        self._stood = np.array(START)
+
+    @property
+    def scripts(self) -> Mapping[int, Callable[[str], Script]]:
+        """See `Person.scripts`."""
+        return {
             Speech.REQUEST_POINT_AT_PLACE: self._point_at_free_place,
             Speech.REQUEST_POINT_AT_OBJECT: self._point_at_object,
+            Speech.REQUEST_HELP: self._help,
+            Speech.REQUEST_THANK_YOU: self.end,
         }
-        return {**super()._scripts(), **more}
+
+    def begin(self) -> Script:
+        """The person sits with a hanging arm, and so it stays between two pointings."""
+        self.arm.hang_at_once(self.arm.hanging_before((*START, tool_box.SURFACE_Z + POINTED_ABOVE_PLANE)))
+        self._hanging = self.arm.posture
+        yield Step(0.1)
+
+    def withdraw(self) -> Script:
+        """The arm hangs again as after the last pointing."""
+        yield from self.arm.hang(self._hanging)
+
+    def handle(self, request: int, name: str = "") -> None:
+        """See `Person.handle`. What is acknowledged is understood: the object will stand there."""
+        if request == Speech.REQUEST_UNSPECIFIED and self.arm.has_pointed and self._place is not None:
+            self._stood, self._place = self._place, None
+        super().handle(request, name)
 
     def _point_at_object(self, _: str) -> Script:
-        yield from self._empty_hand()
         self.doing = f"points at {OBJECT}"
-        yield from self._point_above(self._table.position(OBJECT)[:2])
+        yield from self._point_above(self.table.position(OBJECT)[:2])
 
     def _point_at_free_place(self, _: str) -> Script:
-        yield from self._empty_hand()
         if self._place is None or self._shown >= SAME_PLACE_AT_MOST:
             self._place, self._shown = self._free_place(), 0
         self._shown += 1
@@ -66,28 +91,19 @@ class PlaceInstructor(ArmInstructor):
 
     def _point_above(self, place: Floats) -> Script:
         """Point at a place (2,) and let the arm hang again."""
-        self._has_pointed = False
-        for step in self.point_at_place((*place, tool_box.SURFACE_Z + POINTED_ABOVE_PLANE)):
-            yield step
-            self._resting = self.posture
-        self._take(self._resting)
-        self._has_pointed = False
+        yield from self.arm.point_at((*place, tool_box.SURFACE_Z + POINTED_ABOVE_PLANE))
+        self._hanging = self.arm.posture
 
-    def _begin_seated(self) -> Script:
-        """The person sits with a hanging arm, and so it stays between two pointings."""
-        self._resting = self.person.points_at((*START, tool_box.SURFACE_Z + POINTED_ABOVE_PLANE), self._draw).postures[
-            0
-        ]
-        self._elbow_towards = self._resting[ELBOW] - 0.5 * (self._resting[SHOULDER] + self._resting[WRIST])
-        self._take(self._resting)
-        yield Step(0.1)
-
-    def _withdraw(self) -> Script:
-        yield from self._hang(self._resting)
+    def _help(self, _: str) -> Script:
+        self.arm.follow_hand()
+        self.doing = f"stands {OBJECT} at its start"
+        self._stood, self._place = np.array(START), None
+        yield from self.hand.bring(OBJECT, self._stood)
+        yield from self.withdraw()
 
     def _free_place(self) -> Floats:
         """Another target in the working area, which the person can point at and away from the robot's hand."""
-        gripper = self._table.gripper()[0][:2]
+        gripper = self.table.gripper()[0][:2]
         for _ in range(10_000):
             place = np.array([self._places.uniform(*AREA_X), self._places.uniform(*AREA_Y)])
             free = np.linalg.norm(place - gripper) >= FREE_OF_ROBOT
@@ -95,14 +111,6 @@ class PlaceInstructor(ArmInstructor):
             if free and another and where_people_point(place):
                 return place
         raise RuntimeError(f"no free place in {AREA_X} x {AREA_Y} m with the robot's hand at {gripper}")
-
-    def _help(self, name: str) -> Script:
-        self._posture = None
-        yield from self._empty_hand()
-        self.doing = f"stands {OBJECT} at its start"
-        self._stood, self._place = np.array(START), None
-        yield from self._bring(OBJECT, self._stood)
-        yield from self._withdraw()
 
 
 def where_people_point(place: Floats) -> bool:

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from ruamel.yaml import YAML
 
+from paramove.bus import Received, topics
+from paramove.bus.topics import Topic
 from paramove.cameras import write_cameras
 from paramove.demonstrations import table_place
-from paramove.documents import Image
 from paramove.msgs.truth_pb2 import TruthArm
+from sim.camera import raw_image, with_noise
 from sim.performances import Studio
 from sim.persons.performances import Performance, assembled, kind_named, pointed_once
 from sim.persons.performers import draw_performer
 
+CAMERA_HZ = 15
 SEED_SPACE = 1000
 """Numbers of performances from here on are runs; those below are the clips of chapter 6."""
 REST_S = (1.0, 1.8)
@@ -53,11 +56,22 @@ class PointingWorld:
         self._views = views
         self._noise = np.random.default_rng((SEED_SPACE, seed, 1))
         self.duration_s = float(self._studio.times_s[-1])
+        self._tick = 0
 
     @property
-    def views(self) -> tuple[int, ...]:
-        """Numbers of the cameras that look, from 1."""
-        return self._views
+    def now_s(self) -> float:
+        """Simulated time since the start."""
+        return self._tick / CAMERA_HZ
+
+    @property
+    def now_ns(self) -> int:
+        """Simulated time since the start."""
+        return round(self.now_s * 1e9)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the person has pointed at everything."""
+        return self.now_s > self.duration_s
 
     def write_measures(self, folder: Path) -> None:
         """What people measure beforehand: `cameras.yaml`, with the errors of a calibration, and `person.yaml`."""
@@ -69,9 +83,32 @@ class PointingWorld:
         with (folder / "person.yaml").open("w", encoding="utf-8") as file:
             YAML().dump(measures, file)
 
+    def layout(self) -> None:
+        """None: what does not change is in the measures."""
+
+    def handle(self, received: Received) -> None:
+        """Nobody asks this person for anything."""
+
+    def run_to_tick(self, tick: int) -> None:
+        """Let time pass up to a tick of 1/15 s."""
+        self._tick = tick
+
+    def messages(self) -> Iterator[tuple[Topic, Any]]:
+        """See `sim.simulation.Simulated.messages`."""
+        yield from zip(topics.CAMERA_IMAGES_RAW, self.images_raw(self.now_s), strict=False)
+        yield topics.TRUTH_ARM, self.truth(self.now_s)
+
+    def detail(self, wall_s: float) -> str:
+        """What the person does."""
+        return f"{self.now_s:.0f} s: the person {'points' if self.truth(self.now_s).action else 'rests'}"
+
     def images_raw(self, time_s: float) -> list[RawImage]:
-        """The image of each camera, in the order of `views`."""
-        return [self._image_raw(self._studio.film(time_s, view - 1), view, time_s) for view in self._views]
+        """The image of each camera, in the order of the views."""
+        images = []
+        for view in self._views:
+            exposed = with_noise(self._studio.film(time_s, view - 1), self._studio.room.noise, self._noise)
+            images.append(raw_image(exposed, f"camera_{view}", round(time_s * 1e9)))
+        return images
 
     def truth(self, time_s: float) -> TruthArm:
         """How the arm really is, and where it points."""
@@ -90,14 +127,3 @@ class PointingWorld:
     def close(self) -> None:
         """Gives the graphics context back."""
         self._studio.close()
-
-    def _image_raw(self, image: Image, view: int, time_s: float) -> RawImage:
-        noise = self._noise.normal(0.0, self._studio.room.noise, image.shape).round().astype(np.int8)
-        exposed = cv2.add(image, noise, dtype=cv2.CV_8U)
-        height, width = exposed.shape[:2]
-        message = RawImage(
-            frame_id=f"camera_{view}", width=width, height=height, encoding="rgb8", step=3 * width,
-            data=np.ascontiguousarray(exposed).tobytes(),
-        )  # fmt: skip
-        message.timestamp.FromNanoseconds(round(time_s * 1e9))
-        return message

@@ -13,50 +13,42 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
+from paramove.bus import topics
 from paramove.documents import Image
 from paramove.msgs.rule_pb2 import Speech
-from paramove.robots import RobotDescription
-from paramove.robots.hoap3 import Firmware
-from sim import looks, scene
-from sim.camera import Eye, Sensor
-from sim.instructor import Instructor
-from sim.looks import Looks
-from sim.world import World
-
-ROBOT = scene.ROBOT_MODEL.parent
+from sim.scenes import SceneOptions, at_the_tool_box
+from sim.simulation import Simulation
 
 
-def stages(world: World, instructor: Instructor) -> Iterator[str]:
+def stages(simulation: Simulation) -> Iterator[str]:
     """Lets the story run and stops at each time worth a picture."""
-    description = world.description
-    firmware, counts = Firmware(description), description.units.to_counts(description.base_pose)
+    person, world = simulation.person, simulation.world
 
     def run(until: Callable[[], bool], longest_s: float = 200.0) -> None:
-        for _ in range(int(longest_s * 1000)):
-            if until():
-                return
-            instructor.advance(0.001)
-            world.step(firmware.step(counts, world.joint_positions(), world.joint_velocities()))
+        end_s = world.time_s + longest_s
+        while not until() and world.time_s < end_s:
+            simulation.run_to_tick(simulation.tick + 1)
 
     yield "start"
-    instructor.handle(Speech.REQUEST_HAND_ME_AN_OBJECT)
-    run(lambda: instructor.doing.startswith("holds"))
+    person.handle(Speech.REQUEST_HAND_ME_AN_OBJECT)
+    run(lambda: person.doing.startswith("holds"))
     run(lambda: False, 1.2)
     yield "hand over"
-    instructor.handle(Speech.REQUEST_SHOW_RULES)
-    run(lambda: instructor.doing == "turns the box")
+    person.handle(Speech.REQUEST_SHOW_RULES)
+    run(lambda: person.doing == "turns the box")
     run(lambda: False, 3.0)
     yield "turn the box"
-    run(lambda: instructor.doing.startswith("puts"))
+    run(lambda: person.doing.startswith("puts"))
     run(lambda: world.held_by_instructor is not None)
     yield "show"
     run(lambda: False, 2.6)
     yield "carry"
     run(lambda: world.held_by_instructor is None)
     yield "in its opening"
-    instructor.handle(Speech.REQUEST_POINT_AT_OBJECT)
-    run(lambda: instructor.doing.startswith("points"))
+    person.handle(Speech.REQUEST_POINT_AT_OBJECT)
+    run(lambda: person.doing.startswith("points"))
     yield "before pointing"
     run(lambda: False, 4.5)
     yield "points"
@@ -67,20 +59,21 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=Path("preview.png"))
     arguments = parser.parse_args()
-    draws, world_looks = looks.streams(arguments.seed), Looks.draw(arguments.seed)
-    world = World(world_looks, RobotDescription.load(ROBOT))
-    instructor = Instructor(world, world_looks.rules, draws)
-    eye, view = Eye(world.model, *scene.RENDERED_PX), Eye(world.model, *scene.VIEW_PX)
-    sensor = Sensor(world_looks.camera, world_looks.pixel_noise, draws["noise"])
+    simulation = at_the_tool_box(SceneOptions(seed=arguments.seed, video=True))
     pairs = []
-    for title in stages(world, instructor):
-        exposed = sensor.expose(eye.look(world.data, "camera"))
-        pair = np.concatenate([exposed, view.look(world.data, "view")], axis=1)
-        pairs.append(_titled(pair, f"{title} {world.time_s:.1f} s"))
+    for title in stages(simulation):
+        shown = simulation.shown()
+        pair = np.concatenate(
+            [_picture(shown[topic]) for topic in (topics.CAMERA_IMAGE_RAW, topics.TRUTH_VIEW)], axis=1
+        )
+        pairs.append(_titled(pair, f"{title} {simulation.world.time_s:.1f} s"))
     rows = [np.concatenate(pairs[first : first + 2], axis=1) for first in range(0, len(pairs) - 1, 2)]
     cv2.imwrite(str(arguments.out), cv2.cvtColor(np.concatenate(rows), cv2.COLOR_RGB2BGR))
-    eye.close()
-    view.close()
+    simulation.close()
+
+
+def _picture(image_raw: RawImage) -> Image:
+    return np.frombuffer(image_raw.data, np.uint8).reshape(image_raw.height, image_raw.width, 3)
 
 
 def _titled(picture: Image, title: str) -> Image:

@@ -1,31 +1,33 @@
-"""One run of the simulated world: what comes in from the bus, what happens in a camera period, what it shows."""
+"""One run of a simulated world: what comes in from the bus, what happens in a camera period, what it shows."""
 
 from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, Protocol
 
-import numpy as np
-from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+import mujoco
 
 from paramove.bus import Received, topics
-from paramove.documents import Floats, Image
-from paramove.msgs.hoap3_wire_pb2 import Hoap3State
-from paramove.robots import RobotDescription
-from paramove.robots.hoap3 import Firmware, receive, state_message
-from paramove.robots.streaming import StreamReader
-from sim import looks, scene
-from sim.camera import Eye, Sensor
-from sim.instructor import Instructor
+from paramove.bus.topics import Topic
+from paramove.documents import Floats
+from paramove.msgs.truth_pb2 import TruthLayout
+from sim import truth
+from sim.arm import ELBOW, SHOULDER, TIP, WRIST
+from sim.camera import ImageSource
+from sim.hoap3 import Hoap3
+from sim.human import place_arm
 from sim.looks import Looks
-from sim.tool_box import NOMINAL, Measures
+from sim.person import Person
 from sim.world import World
 
 _log = logging.getLogger(__name__)
 
 CAMERA_HZ = 15
+ARM_PREFIX = "instructor_"
+"""Of the bodies of a person's arm in the model."""
 
 
 def step_of_tick(tick: int) -> int:
@@ -33,50 +35,72 @@ def step_of_tick(tick: int) -> int:
     return -(-1000 * tick // CAMERA_HZ)
 
 
+class Simulated(Protocol):
+    """What the simulator runs: a `Simulation`, or a world that is only filmed."""
+
+    @property
+    def now_ns(self) -> int:
+        """Simulated time since the start."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether nothing more will happen."""
+
+    def write_measures(self, folder: Path) -> None:
+        """Writes what people measure before the run."""
+
+    def layout(self) -> TruthLayout | None:
+        """What does not change in a run; None: nothing."""
+
+    def handle(self, received: Received) -> None:
+        """Handles a message of the bus."""
+
+    def run_to_tick(self, tick: int) -> None:
+        """Lets the world run up to a tick; raises SimulationError."""
+
+    def messages(self) -> Iterator[tuple[Topic, Any]]:
+        """Everything that the world shows now."""
+
+    def detail(self, wall_s: float) -> str:
+        """One line about the run, `wall_s` after its start."""
+
+    def close(self) -> None:
+        """Gives the graphics contexts back."""
+
+
 class Simulation:
-    """The robot with its firmware and stream, the world, the instructor and the camera.
+    """A world of physics with a robot, a person and cameras in it.
 
     Args:
-        seed: Of everything random.
-        description: Of the robot.
-        camera: Whether the camera's images are rendered.
-        video: Whether the view for people is rendered.
-        firmware_log: Gets every frame that the firmware plays, 28 little-endian int16 a millisecond.
-        measures: Of the tool box and of the nominal camera.
+        looks: How the world looks, and who belongs where.
+        world: Its physics.
+        robot: What moves the robot's motors.
+        person: Who acts in it.
+        cameras: What gives images of it.
+        world_from_table: Pose [4, 4] of the frame in which a tracked arm is measured.
+        write_measures: Writes what people measure before the run into a folder.
 
     Attributes:
         physics_s, rendering_s: Wall time spent since the start.
     """
 
+    finished = False
+
     def __init__(
         self,
-        seed: int,
-        description: RobotDescription,
-        camera: bool = True,
-        video: bool = False,
-        firmware_log: BinaryIO | None = None,
-        measures: Measures = NOMINAL,
+        looks: Looks,
+        world: World,
+        robot: Hoap3,
+        person: Person,
+        cameras: Sequence[ImageSource] = (),
+        world_from_table: Floats | None = None,
+        write_measures: Callable[[Path], None] = lambda _: None,
     ) -> None:
-        self._firmware_log = firmware_log
-        draws = looks.streams(seed)
-        self.looks = Looks.draw(seed, measures)
-        self.world = self._new_world(description)
-        self.firmware = Firmware(description)
-        self.firmware.reset(description.base_pose)
-        self.stream = StreamReader(description, description.units.to_counts(description.base_pose))
-        self.instructor = self._new_instructor(draws)
-        self.description = description
-        self._eye = Eye(self.world.model, *scene.RENDERED_PX) if camera else None
-        self._view = Eye(self.world.model, *scene.VIEW_PX) if video else None
-        self._sensor = Sensor(self.looks.camera, self.looks.pixel_noise, draws["noise"])
-        self.physics_s = 0.0
-        self.rendering_s = 0.0
-
-    def _new_world(self, description: RobotDescription) -> World:
-        return World(self.looks, description)
-
-    def _new_instructor(self, draws: dict[str, np.random.Generator]) -> Instructor:
-        return Instructor(self.world, self.looks.rules, draws)
+        self.looks, self.world, self.robot, self.person = looks, world, robot, person
+        self._cameras = cameras
+        self.world_from_table = world_from_table
+        self.write_measures = write_measures
+        self.physics_s = self.rendering_s = 0.0
 
     @property
     def now_ns(self) -> int:
@@ -88,75 +112,67 @@ class Simulation:
         """Number of the latest tick of 1/15 s."""
         return self.world.steps * CAMERA_HZ // 1000
 
-    @property
-    def world_from_table(self) -> Floats | None:
-        """Pose [4, 4] of the table frame of a tracked arm; None where there is none."""
-        return None
-
-    def write_measures(self, folder: Path) -> None:
-        """Writes what people measure before the run: nothing in this world."""
+    def layout(self) -> TruthLayout:
+        """What does not change in a run."""
+        return truth.layout(self.looks, self.world, self.world_from_table)
 
     def handle(self, received: Received) -> None:
         """Handle a message of the stream or of the robot's speech."""
         if received.topic is topics.WIRE_HOAP3_STREAM:
-            receive(received.message, self.stream)
+            self.robot.handle(received.message)
         elif received.topic is topics.SPEECH:
-            self.instructor.handle(received.message.request, received.message.object)
+            self.person.handle(received.message.request, received.message.object)
 
     def run_to_tick(self, tick: int) -> None:
         """Let the world run up to a tick; raises SimulationError."""
         started = time.perf_counter()
-        world, firmware, stream, instructor = self.world, self.firmware, self.stream, self.instructor
-        played = []
+        world = self.world
         while world.steps < step_of_tick(tick):
-            frame = stream.play()
-            played.append(frame)
-            torques = firmware.step(frame, world.joint_positions(), world.joint_velocities())
-            instructor.advance(0.001)
+            torques = self.robot.torques(world.joint_positions(), world.joint_velocities())
+            self.person.advance(0.001)
             world.step(torques)
-        if self._firmware_log is not None:
-            try:
-                self._firmware_log.write(np.array(played, dtype="<i2").tobytes())
-            except OSError as error:  # a full disk ends no run
-                _log.warning("the log of the firmware ends: %s", error.strerror)
-                self._firmware_log = None
+        self.robot.write_log()
         self.physics_s += time.perf_counter() - started
 
-    def image_raw(self) -> RawImage | None:
-        """The camera's image now; None without a camera."""
-        if self._eye is None:
-            return None
+    def messages(self) -> Iterator[tuple[Topic, Any]]:
+        """Everything that the world shows now. A state that is not finite never gets here: the step raises."""
         started = time.perf_counter()
-        image = self._sensor.expose(self._eye.look(self.world.data, "camera"))
-        message = self._raw(image, "camera_optical")
+        if self.person.arm is not None:
+            self._show_arm(self.person.arm.posture)
+        images = [image for camera in self._cameras for image in camera.images(self.world.data, self.tick, self.now_ns)]
         self.rendering_s += time.perf_counter() - started
-        return message
+        yield from images
+        yield topics.WIRE_HOAP3_STATE, self.robot.state(self.world.joint_positions(), self.now_ns)
+        yield topics.TRUTH_STATE, truth.state(self.now_ns, self.world, self.robot, self.person)
+        if self.person.arm is not None:
+            yield topics.TRUTH_ARM, truth.arm(self.now_ns, self.person.arm)
 
-    def view(self) -> RawImage | None:
-        """The view for people; None without video."""
-        if self._view is None:
-            return None
-        started = time.perf_counter()
-        message = self._raw(self._view.look(self.world.data, "view"), "view")
-        self.rendering_s += time.perf_counter() - started
-        return message
+    def shown(self) -> dict[Topic, Any]:
+        """The same by topic."""
+        return dict(self.messages())
 
-    def robot_state(self) -> Hoap3State:
-        """What the robot reports: its stream and its measured joints."""
-        units = self.description.units
-        counts = (units.zero_counts + units.counts_per_rad * self.world.joint_positions()).round().astype("int16")
-        return state_message(self.stream.state(counts, self.now_ns))
+    def detail(self, wall_s: float) -> str:
+        """One line about the run, `wall_s` after its start."""
+        time_s = max(self.world.time_s, 1e-9)
+        percent = 100 / max(wall_s, 1e-9)
+        return (
+            f"{time_s:.0f} s simulated, {time_s / max(wall_s, 1e-9):.2f} times real time "
+            f"(physics {self.physics_s * percent:.0f} %, rendering {self.rendering_s * percent:.0f} %); "
+            f"instructor {self.person.doing}"
+        )
 
     def close(self) -> None:
-        """Gives the graphics contexts back."""
-        for eye in (self._eye, self._view):
-            if eye is not None:
-                eye.close()
+        """Gives the graphics contexts back, and logs contacts that should not have been."""
+        for camera in self._cameras:
+            camera.close()
+        pairs = self.world.contacts.unwanted_pairs
+        if pairs:
+            named = ", ".join(f"{name} ({count})" for name, count in sorted(pairs.items()))
+            _log.warning("unwanted contacts: %s", named)
 
-    def _raw(self, image: Image, frame: str) -> RawImage:
-        height, width = image.shape[:2]
-        message = RawImage(
-            frame_id=frame, width=width, height=height, encoding="rgb8", step=3 * width, data=image.tobytes()
-        )
-        message.timestamp.FromNanoseconds(self.now_ns)
-        return message
+    def _show_arm(self, posture: Floats) -> None:
+        """Brings the rendered arm into a posture (4, 3), shoulder frame."""
+        model, data = self.world.model, self.world.data
+        points = posture + self.world.world_from_shoulder
+        place_arm(model, data, points[[SHOULDER, ELBOW, TIP]].ravel(), points[WRIST], ARM_PREFIX)
+        mujoco.mj_kinematics(model, data)

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramove.msgs.truth_pb2 import TruthBody, TruthLayout, TruthState
+from paramove.documents import Floats
+from paramove.msgs.truth_pb2 import TruthArm, TruthBody, TruthLayout, TruthState
 from sim import tool_box
-from sim.simulation import Simulation
+from sim.arm import ELBOW, SHOULDER, TIP, Arm
+from sim.hoap3 import Hoap3
+from sim.looks import Looks
+from sim.person import Person
+from sim.small_person import table_from_shoulder
+from sim.world import World
 
 
-def layout(simulation: Simulation) -> TruthLayout:
+def layout(looks: Looks, world: World, world_from_table: Floats | None) -> TruthLayout:
     """What does not change in a run."""
-    looks, origin = simulation.looks, simulation.world.world_from_shoulder
-    camera = looks.camera
+    camera, origin = looks.camera, world.world_from_shoulder
     camera_from_world = np.eye(4)
     camera_from_world[:3, :3] = camera.shoulder_from_optical.T
     camera_from_world[:3, 3] = -camera.shoulder_from_optical.T @ (camera.position + origin)
@@ -25,8 +30,8 @@ def layout(simulation: Simulation) -> TruthLayout:
         light_levels=looks.brightness,
         pixel_noise=looks.pixel_noise,
     )
-    if simulation.world_from_table is not None:
-        message.world_from_table.extend(simulation.world_from_table.ravel().tolist())
+    if world_from_table is not None:
+        message.world_from_table.extend(world_from_table.ravel().tolist())
     for item in tool_box.OPENINGS:
         x, y, _ = item.centre + origin
         message.openings.add(name=item.name, x=x, y=y, radius=looks.measures.opening_radius)
@@ -35,40 +40,43 @@ def layout(simulation: Simulation) -> TruthLayout:
     return message
 
 
-def state(simulation: Simulation) -> TruthState:
+def state(now_ns: int, world: World, robot: Hoap3, person: Person) -> TruthState:
     """What is so now."""
-    world, instructor = simulation.world, simulation.instructor
-    contacts = world.contacts
+    contacts, origin = world.contacts, world.world_from_shoulder
     gripper, _ = world.gripper()
     message = TruthState(
-        time_ns=simulation.now_ns,
-        gripper=(gripper + world.world_from_shoulder).tolist(),
-        gripper_commanded=commanded_gripper(simulation).tolist(),
+        time_ns=now_ns,
+        gripper=(gripper + origin).tolist(),
+        gripper_commanded=(robot.commanded_gripper() + origin).tolist(),
         joint_positions=world.joint_positions().tolist(),
         unwanted_contacts=contacts.unwanted,
         deepest_penetration_mm=1e3 * contacts.deepest,
         contacts=world.contact_names(),
-        instructor=instructor.doing,
+        instructor=person.doing,
     )
     for colour in tool_box.COLOURS:
-        body = _body(simulation, colour)
+        body = _body(world, colour)
         body.held_by_instructor = world.held_by_instructor == colour
         body.last_touched_by = world.last_touched_by[colour]
         message.objects.append(body)
-    message.hand.CopyFrom(_body(simulation, "hand"))
+    message.hand.CopyFrom(_body(world, "hand"))
     return message
 
 
-def commanded_gripper(simulation: Simulation) -> np.ndarray:
-    """Gripper of the frame that the firmware plays, by forward kinematics, [3], world frame."""
-    description = simulation.description
-    arm = description.arms["right"]
-    angles = description.units.to_radians(simulation.stream.target)[arm.indices]
-    return np.asarray(arm.kinematics.forward(angles).gripper + simulation.world.world_from_shoulder)
+def arm(now_ns: int, person: Arm) -> TruthArm:
+    """How a person's arm is and where it points, in the table frame."""
+    message = TruthArm(time_ns=now_ns)
+    points = table_from_shoulder(person.posture[[SHOULDER, ELBOW, TIP]])
+    for name, (x, y, z) in zip(("shoulder", "elbow", "hand"), points, strict=True):
+        message.points.add(name=name, x=x, y=y, z=z)
+    if person.target is not None:
+        message.action, message.performance = "pointing", person.pointings
+        message.target.x, message.target.y, message.target.z = table_from_shoulder(person.target)
+        message.at_target = person.at_target
+    return message
 
 
-def _body(simulation: Simulation, name: str) -> TruthBody:
-    world = simulation.world
+def _body(world: World, name: str) -> TruthBody:
     x, y, z = world.position(name) + world.world_from_shoulder
     quaternion = world.quaternion(name)
     return TruthBody(name=name, x=x, y=y, z=z, quaternion_xyzw=quaternion[[1, 2, 3, 0]].tolist())

@@ -14,8 +14,6 @@ MODULES = [
     *(f"nodes.{path.stem}" for path in sorted((ROOT / "nodes").glob("*.py")) if path.stem != "__init__"),
     "sim.simulator",
     "sim.judge",
-    "sim.pointing_simulator",
-    "sim.arm_judge",
     "sim.dynamixel_emulator",
 ]
 INTERFACES = {module.partition(".")[2]: read_interface(module, Workspace.at(ROOT)) for module in MODULES}

@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose
 from paramove.action_space.setup import read_person
 from paramove.msgs.rule_pb2 import Speech
 from sim import looks, places, tool_box
+from sim.arm import ELBOW, SHOULDER, TIP, WRIST
 from sim.arm_cameras import calibrated, draw_arm_cameras
-from sim.arm_instructor import ELBOW, SHOULDER, TIP, WRIST, ArmInstructor
+from sim.instructor import Instructor
 from sim.sights import Sights
 from sim.small_person import (
     POINTED_ABOVE_PLANE,
@@ -45,20 +46,22 @@ class Story:
         for colour, place in zip(tool_box.COLOURS, layout, strict=True):
             self.table.positions[colour] = tool_box.standing_centre(*place)
         draw = np.random.default_rng((seed, 1))
-        self.instructor = ArmInstructor(self.table, RULES, looks.streams(seed), person_of(seed), draw)
+        self.instructor = Instructor(self.table, RULES, looks.streams(seed), person_of(seed), draw)
+        assert self.instructor.arm is not None
+        self.arm = self.instructor.arm
         self.postures: list[np.ndarray] = []
         self.targets: list[tuple[np.ndarray, bool]] = []
 
     def point(self, name: str) -> None:
         sights = Sights(self.table, {})
         assert all(sights.stands(colour) for colour in tool_box.COLOURS)
-        self.instructor._arranged = True
+        self.instructor.arranged = True
         self.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, name)
         for _ in range(60 * 30):
             self.instructor.advance(TICK_S)
-            self.postures.append(self.instructor.posture)
-            if self.instructor.target is not None:
-                self.targets.append((self.instructor.target, self.instructor.at_target))
+            self.postures.append(self.arm.posture)
+            if self.arm.target is not None:
+                self.targets.append((self.arm.target, self.arm.at_target))
             if not self.instructor.busy:
                 return
         raise AssertionError(f"after 30 s the instructor still {self.instructor.doing}")
@@ -88,7 +91,7 @@ def test_points_at_every_corner_of_the_strip(seed: int, corner: tuple[float, flo
 def test_sizes_are_those_of_one_arm_in_every_posture(seed: int) -> None:
     story = Story(seed)
     story.point("green")
-    sizes = story.instructor.person.sizes
+    sizes = story.arm.body.sizes
     lengths = np.linalg.norm(np.diff(story.postures, axis=1), axis=2)
     assert_allclose(lengths[:, SHOULDER], sizes.upper_arm, rtol=0, atol=0.009)  # between postures by straight lines
     assert_allclose(lengths[:, ELBOW], sizes.forearm, rtol=0, atol=0.012)  # and the wrist is bent aside by up to 6 mm
@@ -105,8 +108,8 @@ def test_pointing_is_slow_enough_everywhere_and_tells_its_target(seed: int) -> N
     place = place_over(*story.table.position("blue")[:2])
     assert all(np.array_equal(target, place) for target, _ in story.targets)
     assert 0.15 < TICK_S * sum(there for _, there in story.targets) < 1.5
-    assert story.instructor.target is None
-    assert story.instructor.pointings == 1
+    assert story.arm.target is None
+    assert story.arm.pointings == 1
     assert_allclose(story.postures[-1][TIP], places.IDLE_FINGERTIP, rtol=0, atol=1e-9)
 
 
@@ -148,28 +151,28 @@ def test_calibrated_cameras_see_the_objects_about_where_they_are() -> None:
 
 def test_who_is_asked_again_while_withdrawing_points_again() -> None:
     story = Story(2)
-    story.instructor._arranged = True
+    story.instructor.arranged = True
     story.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "")
     asked = False
     for _ in range(60 * 40):
         story.instructor.advance(TICK_S)
-        if story.instructor.at_target and not asked:
+        if story.arm.at_target and not asked:
             asked = True
             story.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "")
             story.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "")
         if asked and not story.instructor.busy:
             break
-    assert story.instructor.pointings == 2
+    assert story.arm.pointings == 2
 
 
 def test_a_request_before_the_finger_has_arrived_is_the_one_being_answered() -> None:
     story = Story(2)
-    story.instructor._arranged = True
+    story.instructor.arranged = True
     story.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "")
     for _ in range(60 * 40):
         story.instructor.advance(TICK_S)
-        if not story.instructor.at_target and story.instructor.pointings < 1:
+        if not story.arm.at_target and story.arm.pointings < 1:
             story.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "")
         if not story.instructor.busy:
             break
-    assert story.instructor.pointings == 1
+    assert story.arm.pointings == 1

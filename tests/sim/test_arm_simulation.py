@@ -19,24 +19,25 @@ from paramove.cameras.calibrated import read_cameras
 from paramove.msgs.rule_pb2 import Speech
 from paramove.objects.colour_tracker import ColourTracker
 from paramove.pointing.events import PointingEventOptions, PointingEvents
-from paramove.robots.description import RobotDescription
 from paramove.supervision.launch_file import load
 from paramove.workspace import Workspace
-from sim import arm_simulator, looks, tool_box, truth
-from sim.arm_instructor import SEATED_S, TIP
-from sim.arm_simulation import ArmSimulation
+from sim import looks, simulator, tool_box, truth
+from sim.arm import TIP, Arm
+from sim.instructor import SEATED_S, Instructor
+from sim.scenes import Scene
 from sim.simulation import CAMERA_HZ, Simulation
 from sim.small_person import SmallPerson, shoulder_from_table, turn_of_table
+from sim.tracked_person import TrackedPerson
 from sim.world import OPENINGS_UP
-from tests.sim.conftest import ROBOT
+from tests.sim.conftest import ROBOT, simulated
 
 LAUNCH = ROBOT.parents[1] / "launch"
 PLACES = {"yellow": (0.170, 0.045), "green": (0.180, -0.075), "blue": (0.172, -0.015)}
 
 
 @pytest.fixture(scope="module")
-def seeing(description: RobotDescription) -> Iterator[ArmSimulation]:
-    simulation = ArmSimulation(3, description, camera=True)
+def seeing() -> Iterator[Simulation]:
+    simulation = simulated("rule_learning_whole_arm", 3, camera=True)
     yield simulation
     simulation.close()
 
@@ -45,59 +46,66 @@ def lay_table(simulation: Simulation) -> None:
     simulation.world.move_box(np.zeros(3), OPENINGS_UP)
     for name, place in PLACES.items():
         simulation.world.place(name, tool_box.standing_centre(*place))
-    simulation.instructor._arranged = True
+    assert isinstance(simulation.person, Instructor)
+    simulation.person.arranged = True
+
+
+def arm_of(simulation: Simulation) -> Arm:
+    assert simulation.person.arm is not None
+    return simulation.person.arm
 
 
 def picture(image_raw) -> np.ndarray:
     return np.frombuffer(image_raw.data, np.uint8).reshape(image_raw.height, image_raw.width, 3)
 
 
-def test_everything_but_the_arm_is_as_without_it(description: RobotDescription) -> None:
+def test_everything_but_the_arm_is_as_without_it() -> None:
     found = []
-    for kind in (Simulation, ArmSimulation):
-        simulation = kind(5, description, camera=False)
+    scenes: tuple[Scene, ...] = ("rule_learning", "rule_learning_whole_arm")
+    for scene in scenes:
+        simulation = simulated(scene, 5)
         simulation.run_to_tick(5)
-        message = truth.state(simulation)
+        message = truth.state(simulation.now_ns, simulation.world, simulation.robot, simulation.person)
         message.ClearField("hand")
         message.ClearField("instructor")
         found.append((simulation.looks, message.SerializeToString()))
-        assert (simulation.world_from_table is None) == (kind is Simulation)
+        assert (simulation.world_from_table is None) == (scene == "rule_learning")
     assert found[0][0].rules == found[1][0].rules
     assert_allclose(found[0][0].camera.position, found[1][0].camera.position, rtol=0, atol=0)
     assert found[0][1] == found[1][1]
 
 
-def test_the_hand_is_seen_where_the_instructor_holds_it(seeing: ArmSimulation) -> None:
+def test_the_hand_is_seen_where_the_instructor_holds_it(seeing: Simulation) -> None:
     seeing.run_to_tick(3)
-    assert seeing.image_raw() is not None
-    images_raw = seeing.arm_images_raw()
+    shown = seeing.shown()
+    images_raw = [shown[topic] for topic in topics.STEREO_IMAGES_RAW]
     assert [image_raw.frame_id for image_raw in images_raw] == ["camera_1", "camera_2"]
-    posture = seeing.instructor.posture
+    posture = arm_of(seeing).posture
+    assert seeing.world_from_table is not None
     hand = np.linalg.inv(seeing.world_from_table) @ [*(posture[TIP] + seeing.world.world_from_shoulder), 1.0]
-    for image_raw, camera in zip(images_raw, seeing.cameras, strict=True):
+    for image_raw, camera in zip(images_raw, TrackedPerson(3).cameras, strict=True):
         u, v = camera.project(hand[:3]).round().astype(int)
         red, green, blue = picture(image_raw)[v - 12 : v + 13, u - 12 : u + 13].reshape(-1, 3).astype(int).T
         magenta = (red > green + 40) & (blue > green + 20)
         assert magenta.sum() > 15
 
 
-def test_the_robots_own_camera_sees_the_same_hand_and_no_object_in_the_sleeve(seeing: ArmSimulation) -> None:
+def test_the_robots_own_camera_sees_the_same_hand_and_no_object_in_the_sleeve(seeing: Simulation) -> None:
     tracker = ColourTracker()
     seeing.run_to_tick(4)
-    image_raw = seeing.image_raw()
-    assert image_raw is not None
-    found = tracker.update(picture(image_raw)[:, :, ::-1], 0)
+    found = tracker.update(picture(seeing.shown()[topics.CAMERA_IMAGE_RAW])[:, :, ::-1], 0)
     assert {seen.name for seen in found.objects} <= {"magenta", "hand"}
 
 
-def test_the_person_sits_at_first_and_then_withdraws(description: RobotDescription) -> None:
-    simulation = ArmSimulation(7, description, camera=False)
+def test_the_person_sits_at_first_and_then_withdraws() -> None:
+    simulation = simulated("rule_learning_whole_arm", 7)
+    arm = arm_of(simulation)
     simulation.run_to_tick(round(0.5 * SEATED_S * CAMERA_HZ))
-    seated = simulation.instructor.posture
-    assert_allclose(seated[0], simulation.person.seat, rtol=0, atol=0.02)
-    assert seated[TIP, 2] < simulation.person.seat[2] - 0.2
+    seated = arm.posture
+    assert_allclose(seated[0], arm.body.seat, rtol=0, atol=0.02)
+    assert seated[TIP, 2] < arm.body.seat[2] - 0.2
     simulation.run_to_tick(round((SEATED_S + 3.0) * CAMERA_HZ))
-    moved = simulation.instructor.posture
+    moved = arm.posture
     assert looks.sees_enough(simulation.looks.camera)
     assert np.linalg.norm(moved[TIP] - seated[TIP]) > 0.3
 
@@ -112,9 +120,9 @@ def test_the_overlay_knows_where_the_table_frame_is() -> None:
     assert_allclose(turn_of_table() @ turn_of_table().T, np.eye(3), rtol=0, atol=1e-12)
 
 
-def test_a_tracker_tells_the_object_that_is_pointed_at(description: RobotDescription) -> None:
+def test_a_tracker_tells_the_object_that_is_pointed_at() -> None:
     """From what people measure beforehand and from images alone."""
-    simulation = ArmSimulation(11, description, camera=True)
+    simulation = simulated("rule_learning_whole_arm", 11, camera=True)
     lay_table(simulation)
     with tempfile.TemporaryDirectory() as folder:
         simulation.write_measures(Path(folder))
@@ -123,12 +131,12 @@ def test_a_tracker_tells_the_object_that_is_pointed_at(description: RobotDescrip
         setup = TrackingSetup.model_validate(launch.file.nodes["action_tracker"].parameters)
         tracker = setup.video_tracker(Path(folder))
     events = PointingEvents(PointingEventOptions(min_certainty=0.6))
-    simulation.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "blue")
+    simulation.person.handle(Speech.REQUEST_POINT_AT_OBJECT, "blue")
     said = []
     for tick in range(0, 20 * CAMERA_HZ, 2):
         simulation.run_to_tick(tick)
-        simulation.place_arm()
-        for image_raw in simulation.arm_images_raw():
+        shown = simulation.shown()
+        for image_raw in (shown[topic] for topic in topics.STEREO_IMAGES_RAW):
             for moment in tracker.see(image_raw.frame_id, simulation.now_ns, picture(image_raw)):
                 estimate = estimate_message(moment, tracker.parameter_names, setup.particles, setup.table_place)
                 gesture = events.update(estimate)
@@ -136,8 +144,9 @@ def test_a_tracker_tells_the_object_that_is_pointed_at(description: RobotDescrip
         if said:
             break
     simulation.close()
-    assert simulation.instructor.at_target
-    assert simulation.instructor.pointed_at == "blue"
+    assert arm_of(simulation).at_target
+    assert isinstance(simulation.person, Instructor)
+    assert simulation.person.pointed_at == "blue"
     (gesture,) = said
     assert gesture.frame == "right_shoulder"
     assert np.hypot(gesture.x - PLACES["blue"][0], gesture.y - PLACES["blue"][1]) < 0.020
@@ -149,9 +158,11 @@ def test_images_of_the_arm_come_as_often_as_asked_for() -> None:
         for name in ("bus", "truth"):
             (folder / name).mkdir(mode=0o700)
         settings = BusSettings(folder=folder / "bus", truth_folder=folder / "truth", clock="simulated")
-        with Bus("simulator", settings, arm_simulator.SUBSCRIBES, arm_simulator.PUBLISHES, folder) as bus:
-            config = arm_simulator.Config(seed=1, robot=ROBOT, max_duration_s=0.6, pace=1000.0, arm_image_every=2)
-            arm_simulator.run(bus, config)
+        with Bus("simulator", settings, simulator.SUBSCRIBES, simulator.PUBLISHES, folder) as bus:
+            config = simulator.Config(
+                scene="rule_learning_whole_arm", seed=1, robot=ROBOT, max_duration_s=0.6, pace=1000.0, arm_image_every=2
+            )
+            simulator.run(bus, config)
             said = {name: publisher.sequence for name, publisher in bus.exchange.publishers.items()}
         assert said["camera/image_raw"] == said["truth/arm"] == said["clock"] == 9
         assert said["camera_1/image_raw"] == said["camera_2/image_raw"] == 5

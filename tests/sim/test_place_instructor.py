@@ -8,7 +8,7 @@ import pytest
 from paramove.applications.options import RelocatorOptions
 from paramove.msgs.rule_pb2 import Speech
 from sim import looks, tool_box
-from sim.arm_instructor import ELBOW, SHOULDER, TIP
+from sim.arm import ELBOW, SHOULDER, TIP
 from sim.place_instructor import (
     ANOTHER_PLACE,
     FREE_OF_ROBOT,
@@ -32,10 +32,10 @@ class Story:
         self.table = FakeTable()
         self.table.gripper_position = np.array(OPTIONS.hold)
         self.table.positions[OBJECT] = np.array(OPTIONS.hold)
-        rules = {"yellow": "opening_2", "green": "opening_0", "blue": "opening_3"}
         draw = np.random.default_rng((seed, 1))
         person = SmallPerson(np.random.default_rng(seed))
-        self.instructor = PlaceInstructor(self.table, rules, looks.streams(seed), person, draw)
+        self.instructor = PlaceInstructor(self.table, looks.streams(seed), person, draw)
+        self.arm = self.instructor.arm
 
     def until(self, condition, longest_s: float = 40.0) -> None:
         for _ in range(round(longest_s / TICK_S)):
@@ -45,9 +45,9 @@ class Story:
         raise AssertionError(f"after {longest_s} s the instructor still {self.instructor.doing}")
 
     def until_there(self) -> np.ndarray:
-        self.until(lambda: self.instructor.at_target)
-        assert self.instructor.target is not None
-        return self.instructor.target
+        self.until(lambda: self.arm.at_target)
+        assert self.arm.target is not None
+        return self.arm.target
 
     def until_done(self) -> None:
         self.until(lambda: not self.instructor.busy)
@@ -68,7 +68,7 @@ def test_points_at_free_places_that_the_robot_reaches(seed):
         story.instructor.handle(Speech.REQUEST_UNSPECIFIED)
         story.until_done()
         before = np.array([x, y])
-    assert story.instructor.pointings == 3
+    assert story.arm.pointings == 3
 
 
 def test_who_is_not_understood_points_once_more_at_the_same_place_then_at_another():
@@ -77,7 +77,7 @@ def test_who_is_not_understood_points_once_more_at_the_same_place_then_at_anothe
     places = [story.until_there()]
     for _ in range(2):
         story.instructor.handle(PLACE, OBJECT)  # still at the place, or on the way back
-        story.until(lambda: not story.instructor.at_target)
+        story.until(lambda: not story.arm.at_target)
         places.append(story.until_there())
     assert np.array_equal(places[0], places[1])
     assert not np.array_equal(places[1], places[2])
@@ -89,7 +89,7 @@ def test_a_request_that_is_repeated_before_the_hand_arrives_is_one():
     story.instructor.advance(0.5)
     story.instructor.handle(PLACE, OBJECT)
     story.until_done()
-    assert story.instructor.pointings == 1
+    assert story.arm.pointings == 1
 
 
 def test_points_at_the_object_where_it_stands():
@@ -100,7 +100,7 @@ def test_points_at_the_object_where_it_stands():
     assert (x, y) == pytest.approx(START)
     assert z > tool_box.SURFACE_Z + 2 * tool_box.CYLINDER_HALF_HEIGHT
     story.until_done()
-    assert story.instructor.posture[TIP, 2] < tool_box.SURFACE_Z
+    assert story.arm.posture[TIP, 2] < tool_box.SURFACE_Z
 
 
 def test_helps_by_standing_the_object_at_its_start():
@@ -118,7 +118,7 @@ def test_the_arm_hangs_between_two_pointings_and_never_jumps(seed):
     story.instructor.advance(1.0)
     for _ in range(2):
         story.instructor.handle(PLACE, OBJECT)
-        story.until(lambda: postures.append(story.instructor.posture) or not story.instructor.busy)
+        story.until(lambda: postures.append(story.arm.posture) or not story.instructor.busy)
         hanging = postures[-1]
         assert hanging[TIP, 2] < tool_box.SURFACE_Z
         assert np.hypot(*(hanging[TIP, :2] - [OPTIONS.area_x[1], OPTIONS.area_y[0]])) > OPTIONS.hand_away

@@ -16,16 +16,17 @@ from paramove.objects.colour_tracker import ColourTracker
 from paramove.robots.description import RobotDescription
 from paramove.robots.hoap3.wire import batch_message
 from paramove.robots.streaming.stream import StreamWriter
-from sim import looks, tool_box, truth
+from sim import looks, tool_box
 from sim.camera import Eye, GraphicsError
 from sim.simulation import Simulation, step_of_tick
 from sim.world import OPENINGS_UP, World
+from tests.sim.conftest import simulated
 
 
 @pytest.fixture(scope="module")
-def seeing(description: RobotDescription) -> Iterator[Simulation]:
+def seeing() -> Iterator[Simulation]:
     """With a camera: opening the graphics takes longer than the tests."""
-    simulation = Simulation(2, description, camera=True, video=True)
+    simulation = simulated("rule_learning", 2, camera=True, video=True)
     yield simulation
     simulation.close()
 
@@ -36,55 +37,55 @@ def test_ticks_are_67_67_and_66_ms_and_never_drift() -> None:
     assert step_of_tick(15 * 600) == 600_000
 
 
-def test_the_same_seed_and_words_give_the_same_truth(description: RobotDescription) -> None:
+def test_the_same_seed_and_words_give_the_same_truth() -> None:
     runs = []
     for _ in range(2):
-        simulation = Simulation(9, description, camera=False)
+        simulation = simulated("rule_learning", 9)
         simulation.handle(_heard(topics.SPEECH, Speech(request=Speech.REQUEST_HAND_ME_AN_OBJECT)))
         for tick in range(1, 25):
             simulation.run_to_tick(tick)
-        runs.append(truth.state(simulation).SerializeToString(deterministic=True))
+        runs.append(simulation.shown()[topics.TRUTH_STATE].SerializeToString(deterministic=True))
     assert runs[0] == runs[1]
 
 
 def test_robot_plays_the_stream_and_reports_it(description: RobotDescription) -> None:
-    simulation = Simulation(0, description, camera=False)
+    simulation = simulated("rule_learning", 0)
     wrist = description.index("right_wrist")
     rows = np.repeat(description.base_pose[None], 400, axis=0)
     share = np.clip(np.arange(400) / 300, 0, 1)
     rows[:, wrist] -= np.deg2rad(30) * share**3 * (10 - 15 * share + 6 * share**2)
     batch = StreamWriter(description, epoch=7).batch(0, rows, ramp_rows=100)
     simulation.handle(_heard(topics.WIRE_HOAP3_STREAM, batch_message(batch)))
-    assert not simulation.stream.rejection
+    assert not simulation.robot.stream.rejection
     simulation.run_to_tick(3)
-    state = simulation.robot_state()
+    state = simulation.shown()[topics.WIRE_HOAP3_STATE]
     assert (state.epoch, state.next_index, state.depth) == (7, 200, 200)
     assert state.playing == Hoap3State.PLAYING_FRAMES
     simulation.run_to_tick(15)
-    assert simulation.robot_state().playing == Hoap3State.PLAYING_HELD
+    assert simulation.shown()[topics.WIRE_HOAP3_STATE].playing == Hoap3State.PLAYING_HELD
     angle = simulation.world.joint_positions()[wrist]
     assert_allclose(angle, description.base_pose[wrist] - np.deg2rad(30), rtol=0, atol=np.deg2rad(2.5))
-    found = truth.state(simulation)
+    found = simulation.shown()[topics.TRUTH_STATE]
     assert_allclose(found.gripper, found.gripper_commanded, rtol=0, atol=2e-3)
 
 
 def test_a_bad_batch_is_refused_and_reported(description: RobotDescription) -> None:
-    simulation = Simulation(0, description, camera=False)
+    simulation = simulated("rule_learning", 0)
     rows = np.repeat(description.base_pose[None], 50, axis=0)
     rows[20:, description.index("right_elbow")] += np.deg2rad(5.0)  # a jump
     rows[20:, description.index("right_elbow")] -= np.deg2rad(10.0)
     batch = StreamWriter(description, epoch=7).batch(0, rows, 10)
     simulation.handle(_heard(topics.WIRE_HOAP3_STREAM, batch_message(batch)))
-    state = simulation.robot_state()
+    state = simulation.shown()[topics.WIRE_HOAP3_STATE]
     assert state.rejected_batches == 1
     assert "right_elbow" in state.rejection
     simulation.run_to_tick(2)
     assert_allclose(simulation.world.joint_positions(), description.base_pose, rtol=0, atol=np.deg2rad(0.6))
 
 
-def test_layout_tells_openings_rules_and_camera_in_the_world_frame(description: RobotDescription) -> None:
-    simulation = Simulation(6, description, camera=False)
-    layout = truth.layout(simulation)
+def test_layout_tells_openings_rules_and_camera_in_the_world_frame() -> None:
+    simulation = simulated("rule_learning", 6)
+    layout = simulation.layout()
     origin = np.array(layout.world_from_shoulder)
     assert {rule.object: rule.opening for rule in layout.rules} == simulation.looks.rules
     for told, item in zip(layout.openings, tool_box.OPENINGS, strict=True):
@@ -106,8 +107,7 @@ def test_camera_shows_each_colour_where_it_stands(seeing: Simulation) -> None:
     for colour, place in places.items():
         world.place(colour, tool_box.standing_centre(*place))
     world.step(np.zeros(world.description.n_joints))
-    image_raw = seeing.image_raw()
-    assert image_raw is not None
+    image_raw = seeing.shown()[topics.CAMERA_IMAGE_RAW]
     assert (image_raw.width, image_raw.height, image_raw.encoding) == (looks.WIDTH_PX, looks.HEIGHT_PX, "rgb8")
     image = np.frombuffer(image_raw.data, np.uint8).reshape(image_raw.height, image_raw.width, 3)
     found = {item.name: item for item in ColourTracker().update(np.ascontiguousarray(image[:, :, ::-1])).objects}
@@ -118,8 +118,7 @@ def test_camera_shows_each_colour_where_it_stands(seeing: Simulation) -> None:
 
 
 def test_view_is_another_picture(seeing: Simulation) -> None:
-    view = seeing.view()
-    assert view is not None
+    view = seeing.shown()[topics.TRUTH_VIEW]
     assert len(view.data) == 3 * view.width * view.height
     assert np.frombuffer(view.data, np.uint8).std() > 20
 

@@ -13,21 +13,24 @@ from pydantic import ValidationError
 from paramove.bus import topics
 from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
+from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording.parts import PartedRecording
 from paramove.recording.writer import RecordingWriter
-from paramove.robots.description import RobotDescription
 from sim import judge, simulator
 from sim.judge import Judge
 from sim.simulation import Simulation
-from sim.truth import layout, state
 from sim.world import SimulationError
-from tests.sim.conftest import ROBOT
+from tests.sim.conftest import ROBOT, simulated
 
 
 @pytest.fixture
 def folder() -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="pm", dir="/tmp") as path:  # paths of sockets are short
         yield Path(path)
+
+
+def truth_of(simulation: Simulation) -> TruthState:
+    return simulation.shown()[topics.TRUTH_STATE]
 
 
 def _bus(folder: Path) -> Bus:
@@ -59,8 +62,20 @@ def test_a_state_that_is_not_finite_is_never_published(folder: Path, monkeypatch
         assert bus.exchange.publishers["truth/state"].sequence == 4
 
 
-@pytest.mark.parametrize("parameters", [{"seed": -1}, {"pace": 0.0}, {"max_duration_s": -1.0}, {"sed": 1}])
-def test_wrong_parameters_are_refused(parameters: dict[str, float]) -> None:
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"seed": -1},
+        {"pace": 0.0},
+        {"max_duration_s": -1.0},
+        {"sed": 1},
+        {"scene": "kitchen"},
+        {"targets": 3},
+        {"scene": "pointing", "video": True},
+        {"scene": "rule_learning", "arm_image_every": 2},
+    ],
+)
+def test_wrong_parameters_are_refused(parameters: dict[str, object]) -> None:
     with pytest.raises(ValidationError):
         simulator.Config.model_validate(parameters)
 
@@ -72,16 +87,16 @@ def test_only_evaluators_hear_of_the_truth() -> None:
 
 
 def test_judge_writes_a_verdict_that_can_be_read_at_any_time(folder: Path) -> None:
-    simulation = Simulation(3, RobotDescription.load(ROBOT), camera=False)
+    simulation = simulated("rule_learning", 3)
     file = folder / "truth.json"
     found = Judge(file)
     assert not found.write()["success"]
-    assert found.take(state(simulation)) == ""  # not told the layout yet
-    found.begin(layout(simulation))
+    assert found.take(truth_of(simulation)) == ""  # not told the layout yet
+    found.begin(simulation.layout())
     sentences = []
     for tick in range(1, judge.RENEW_STATES + 1):
         simulation.run_to_tick(min(tick, 5))
-        sentences.append(found.take(state(simulation)))
+        sentences.append(found.take(truth_of(simulation)))
     assert sentences[-1] == "0 of 3 objects rest where the robot should put them"
     assert not any(sentences[:-1])
     summary = json.loads(file.read_text(encoding="utf-8"))
@@ -92,8 +107,8 @@ def test_judge_writes_a_verdict_that_can_be_read_at_any_time(folder: Path) -> No
 
 
 def test_judge_that_was_started_again_recalls_what_was_recorded(folder: Path) -> None:
-    simulation = Simulation(3, RobotDescription.load(ROBOT), camera=False)
-    told, path = layout(simulation), folder / "truth.mcap"
+    simulation = simulated("rule_learning", 3)
+    told, path = simulation.layout(), folder / "truth.mcap"
     whole, first, second = (Judge(folder / f"{name}.json") for name in ("whole", "first", "second"))
     with RecordingWriter(path, "a test") as recording:
         for judged in (whole, first):
@@ -101,14 +116,14 @@ def test_judge_that_was_started_again_recalls_what_was_recorded(folder: Path) ->
         recording.write(topics.TRUTH_LAYOUT.name, told, 0, 0, 1)
         for tick in range(1, 9):
             simulation.run_to_tick(tick)
-            truth = state(simulation)
+            truth = truth_of(simulation)
             recording.write(topics.TRUTH_STATE.name, truth, tick, tick, tick)
             whole.take(truth)
     assert second.recall(PartedRecording(path)) == 8
     second.begin(told)  # is said to every newcomer
     simulation.run_to_tick(9)
     for judged in (whole, second):
-        judged.take(state(simulation))
+        judged.take(truth_of(simulation))
     by_wall = ("begun_monotonic_s", "wall_s", "realtime_factor")
     found, expected = ({k: v for k, v in judged.write().items() if k not in by_wall} for judged in (second, whole))
     assert found == expected

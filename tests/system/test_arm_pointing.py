@@ -8,9 +8,9 @@ import pytest
 
 from paramove.bus import topics
 from paramove.recording.parts import PartedRecording
-from paramove.robots.description import RobotDescription
-from sim.arm_instructor import SEATED_S, TIP
-from sim.arm_simulation import ArmSimulation
+from sim.arm import TIP
+from sim.instructor import SEATED_S
+from sim.scenes import SceneOptions, at_the_tool_box
 from tests.system.conftest import ROOT
 
 SEED = 4
@@ -28,9 +28,11 @@ def test_a_seated_arm_is_tracked_in_lockstep_and_told_in_the_robots_frame(launch
     estimates = [one.message for one in recorded if one.topic == topics.ACTION_ESTIMATE.name]
     times_s = np.array([one.captured.ToNanoseconds() for one in estimates]) * 1e-9
     assert np.allclose(np.diff(times_s), 2 / 15, rtol=0, atol=0.002), shown  # every second tick, and none is left out
-    simulation = ArmSimulation(SEED, RobotDescription.load(ROOT / "robot_description" / "hoap3"), camera=False)
+    robot = ROOT / "robot_description" / "hoap3"
+    simulation = at_the_tool_box(SceneOptions(scene="rule_learning_whole_arm", seed=SEED, robot=robot, camera=False))
+    assert simulation.person.arm is not None
     simulation.run_to_tick(15)
-    tip = simulation.instructor.posture[TIP]
+    tip = simulation.person.arm.posture[TIP]
     seated = [one for one, time_s in zip(estimates, times_s, strict=True) if 2.0 < time_s < SEATED_S]
     assert len(seated) > 10
     assert all(one.frame == "right_shoulder" and one.views == 2 and not one.lost for one in seated)
