@@ -11,6 +11,7 @@ from paramove.demonstrations.reaching import train_reaching_model
 from paramove.motion.arm_pose import ArmPoseSolver
 from paramove.motion.clearance import ClearanceChecker, UprightCylinder, WorkSurface
 from paramove.motion.conversion import RobotMovement
+from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.relocation import RelocationPlanner
 from paramove.motion.setup import SurfaceParameters
 from paramove.phmm import InterpolativePHMM
@@ -38,6 +39,9 @@ def solver() -> ArmPoseSolver:
     return ArmPoseSolver(HOAP3, ARM)
 
 
+RIGHT = GripperArm.of(HOAP3, "right")
+
+
 @cache
 def movement() -> RobotMovement:
     return RobotMovement.from_model(reaching_model(), solver().length)
@@ -52,7 +56,8 @@ def planner() -> RelocationPlanner:
 @cache
 def checker() -> ClearanceChecker:
     box = WorkSurface(SURFACE.x, SURFACE.y, SURFACE.z)
-    return ClearanceChecker(HOAP3, "right", box, UprightCylinder(SURFACE.object_radius, SURFACE.object_height))
+    cylinder = UprightCylinder(SURFACE.object_radius, SURFACE.object_height)
+    return ClearanceChecker(HOAP3, RIGHT, box, cylinder)
 
 
 def at(place: tuple[float, float], z: float = GRASP_Z) -> np.ndarray:

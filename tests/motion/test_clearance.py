@@ -6,10 +6,19 @@ import mujoco
 import numpy as np
 import pytest
 
-from paramove.motion.clearance import ClearanceChecker, UprightCylinder, WorkSurface
-from tests.motion.reaching import ARM, HOAP3, JOINTS, SURFACE, at, checker, planner, solver
+from paramove.motion.clearance import (
+    GRASPED_ABOVE_MIDDLE,
+    MAX_STANDING,
+    ClearanceChecker,
+    UprightCylinder,
+    WorkSurface,
+)
+from paramove.motion.gripper_arm import GripperArm
+from paramove.robots import RobotDescription
+from tests.motion.reaching import ARM, HOAP3, JOINTS, RIGHT, SURFACE, at, checker, planner, solver
+from tests.robots.servo_arms import ARMS, ArmModel
 
-MIDDLE_Z = SURFACE.z + SURFACE.object_height / 2
+each_servo_arm = pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.name)
 
 
 def over_the_surface(height: float) -> np.ndarray:
@@ -68,25 +77,21 @@ def test_far_away_nothing_is_told_apart() -> None:
 
 @pytest.mark.parametrize("gap", [0.004, 0.010, 0.018])
 def test_a_held_cylinder_keeps_its_distance_from_a_standing_one(gap: float) -> None:
-    """Two upright cylinders: the distance is that of their axes less twice the radius."""
-    angles = over_the_surface(0.09)
-    level = ARM.kinematics.forward(angles[0, :5]).shoulder_from_hand
-    held = ARM.kinematics.forward(angles[0, :5]).gripper + level @ [0.0, 0.0, -0.011]
-    # A standing object right below the held one; its upper face is as far below the held one's lowest edge as `gap`.
-    tilt = np.arccos(level[2, 2])
-    lowest = held[2] - 0.025 * np.cos(tilt) - 0.010 * np.sin(tilt)
-    below = np.array([[held[0] - 0.025 * level[0, 2], held[1] - 0.025 * level[1, 2], lowest - gap - 0.025]])
-    holding = checker().smallest(angles, below, [True])
-    np.testing.assert_allclose(holding.distance, gap, rtol=0, atol=5e-4)
-    assert set(holding.pair) == {"held", "standing_0"}
+    """One upright cylinder right above the other."""
+    angles = over_the_surface(SURFACE.object_height + gap + SURFACE.object_height / 2 + GRASPED_ABOVE_MIDDLE)
+    below = ARM.kinematics.forward(angles[0, :5]).gripper[None, :2]
+    for found in (checker().smallest(angles, below, [True]), checker().to_standing(angles, below, [True])):
+        np.testing.assert_allclose(found.distance, gap, rtol=0, atol=5e-4)
+        assert set(found.pair) == {"held", "standing_0"}
+        assert found.standing == 0
     empty = checker().smallest(angles, below, [False])
-    assert empty.distance > holding.distance
+    assert empty.distance > gap
 
 
 def test_the_nearest_of_several_objects_and_the_sample_are_named() -> None:
     path = np.concatenate([over_the_surface(h) for h in np.linspace(0.12, 0.06, 9)])
     place = ARM.kinematics.forward(path[-1, :5]).gripper
-    standing = [[0.20, 0.10, MIDDLE_Z], [place[0], place[1], MIDDLE_Z], [0.12, -0.15, MIDDLE_Z]]
+    standing = [[0.20, 0.10], place[:2], [0.12, -0.15]]
     found = checker().smallest(path, standing, np.zeros(9, bool))
     assert found.pair[1] == "standing_1"
     assert found.sample == 8
@@ -99,13 +104,13 @@ def test_an_object_that_has_been_taken_away_is_forgotten() -> None:
     angles = over_the_surface(0.09)
     free = checker().smallest(angles, [], [False]).distance
     place = ARM.kinematics.forward(angles[0, :5]).gripper
-    assert checker().smallest(angles, [[*place[:2], MIDDLE_Z]], [False]).distance < free
+    assert checker().smallest(angles, [place[:2]], [False]).distance < free
     assert checker().smallest(angles, [], [False]).distance == free
 
 
 def test_a_hand_at_the_body_is_seen() -> None:
     """Poses all over the range, the table out of the way: some put the hand into the body, and it is named."""
-    table_away = ClearanceChecker(HOAP3, "right", WorkSurface(SURFACE.x, SURFACE.y, -1.0), UprightCylinder())
+    table_away = ClearanceChecker(HOAP3, RIGHT, WorkSurface(SURFACE.x, SURFACE.y, -1.0), UprightCylinder())
     draw = np.random.default_rng(0)
     limits = HOAP3.soft_lower[JOINTS], HOAP3.soft_upper[JOINTS]
     poses = draw.uniform(*limits, (400, 6))
@@ -119,21 +124,73 @@ def test_a_hand_at_the_body_is_seen() -> None:
 
 def test_a_lower_table_is_further_away() -> None:
     lower = WorkSurface(SURFACE.x, SURFACE.y, SURFACE.z - 0.007)
-    other = ClearanceChecker(HOAP3, "right", lower, UprightCylinder())
+    other = ClearanceChecker(HOAP3, RIGHT, lower, UprightCylinder())
     angles = over_the_surface(0.035)
     gained = other.smallest(angles, [], [False]).distance - checker().smallest(angles, [], [False]).distance
     np.testing.assert_allclose(gained, 0.007, rtol=0, atol=1e-5)
 
 
 def test_more_objects_than_it_was_made_for_are_refused() -> None:
-    with pytest.raises(ValueError, match="4 standing objects; this checker was made for 3"):
-        checker().smallest(over_the_surface(0.09), np.zeros((4, 3)), [False])
+    with pytest.raises(ValueError, match=r"9 standing objects.* 8"):
+        checker().smallest(over_the_surface(0.09), np.zeros((MAX_STANDING + 1, 2)), [False])
 
 
 def test_a_fetch_closes_the_hand_around_its_object_without_being_pushed_away_from_the_others() -> None:
     """With the fetched object among those to keep clear of, no path to it would be clear."""
     motion = planner().fetch(at((0.177, -0.02)))
-    own = [[0.177, -0.02, MIDDLE_Z]]
+    own = [[0.177, -0.02]]
     assert checker().smallest(motion.angles, own, motion.holding, every=6).distance < 0.0
-    far = [[0.177, 0.065, MIDDLE_Z]]
+    far = [[0.177, 0.065]]
     assert checker().smallest(motion.angles, far, motion.holding, every=6).distance > 0.005
+
+
+def of_servo_arm(robot: RobotDescription, table_z: float = 0.0) -> ClearanceChecker:
+    table = WorkSurface((-1.0, 1.0), (-1.0, 1.0), table_z)
+    return ClearanceChecker(robot, GripperArm.of(robot, ""), table, UprightCylinder())
+
+
+def poses(robot: RobotDescription, count: int) -> np.ndarray:
+    indices = [*robot.chain.indices, robot.chain.gripper_index]
+    return np.random.default_rng(3).uniform(robot.lower[indices], robot.upper[indices], size=(count, len(indices)))
+
+
+@each_servo_arm
+def test_heights_are_those_of_the_lowest_part_above_the_table(robot: RobotDescription) -> None:
+    """As in the arm's scene, whose table is another shape."""
+    scene = ArmModel(robot, "scene.xml")
+    model, data = scene.model, scene.data
+    table = model.geom("table").id
+    model.geom_size[table, :2], model.geom_rbound[table] = 2.0, 3.0  # under all of the arm
+    arm = model.body_rootid[model.joint(robot.chain.joints[0]).bodyid[0]]
+    bodies = model.geom_bodyid
+    moving = np.flatnonzero((model.body_weldid[bodies] != 0) & (model.body_rootid[bodies] == arm)).tolist()
+    rows, above = poses(robot, 60), 0
+    for row, height in zip(rows, of_servo_arm(robot).heights(rows), strict=True):
+        angles = robot.base_pose.copy()
+        angles[[*robot.chain.indices, robot.chain.gripper_index]] = row
+        scene.place(angles)
+        nearest = min(mujoco.mj_geomDistance(model, data, table, geom, 1.0, None) for geom in moving)
+        if height > 1e-3:
+            above += 1
+            assert nearest == pytest.approx(height, rel=0, abs=1e-4)
+        else:
+            assert nearest < 1.1e-3
+    assert above > 15
+
+
+@each_servo_arm
+def test_the_table_may_stand_lower_or_higher(robot: RobotDescription) -> None:
+    rows = poses(robot, 5)
+    at_base, lower = (of_servo_arm(robot, z).heights(rows) for z in (0.0, -0.1))
+    np.testing.assert_allclose(lower - at_base, 0.1, rtol=0, atol=1e-12)
+
+
+@each_servo_arm
+def test_the_arm_that_folds_into_its_base_is_told_with_what_touches(robot: RobotDescription) -> None:
+    clearance = of_servo_arm(robot)
+    indices = [*robot.chain.indices, robot.chain.gripper_index]
+    assert clearance.touching(robot.base_pose[indices][None]) is None
+    touching = [clearance.touching(row[None]) for row in poses(robot, 200)]
+    assert any(pair is not None for pair in touching)
+    assert all(len(set(pair)) == 2 for pair in touching if pair is not None)
+    assert clearance.touching(np.stack([robot.base_pose[indices]] * 2)) is None

@@ -224,7 +224,7 @@ def test_a_status_with_a_time_that_is_no_number_is_passed_over() -> None:
         (RelocationGoal(id="empty"), "this arm's goals are in 'right_shoulder'"),
         (RelocationGoal(id="none", frame="right_shoulder"), "kind 0 is none of RELOCATE"),
         (relocate("avoid", avoid=[(float("nan"), 0.0)]), "to avoid are .*nan.*; finite numbers in m"),
-        (relocate("many", avoid=[(0.2, 0.1), (0.2, 0.05), (0.2, 0.0), (0.2, -0.05)]), "4 objects .* at most 3"),
+        (relocate("many", avoid=[(0.2, 0.01 * k) for k in range(9)]), "9 objects .* at most 8"),
         (relocate("up", target=(0.135, -0.038, float("inf"))), "finite numbers in m"),
     ],
     ids=["default", "no frame", "no kind", "nan to avoid", "too many to avoid", "infinite height"],

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from paramove.motion.clearance import UprightCylinder
+from paramove.motion.clearance import MAX_STANDING, ClearanceChecker, UprightCylinder, WorkSurface
 from paramove.motion.planned_motion import PlannedMotion, RestPose
 from paramove.motion.plans import NoPlanError
 from paramove.motion.servo_arm_reaching import ServoArmReaching
-from paramove.motion.table_clearance import MAX_STANDING, TableClearance
 from paramove.robots.description import DescriptionError
 from paramove.robots.out_of_reach import OutOfReachError
 from paramove.safety.trajectory_check import check_trajectory
@@ -138,20 +137,18 @@ def test_begins_wherever_the_arm_is(name: str) -> None:
 @each_arm
 def test_a_standing_object_in_the_way_is_kept_clear_of(name: str) -> None:
     robot, tall = description(name), UprightCylinder(0.01, 0.08)
-    plan, clearance = (
-        ServoArmReaching(robot, reaching_model(), cylinder=tall),
-        TableClearance(robot, robot.chain, 0.0, tall),
-    )
+    plan = ServoArmReaching(robot, reaching_model(), cylinder=tall)
+    clearance = ClearanceChecker(robot, plan.arm, WorkSurface((-1.0, 1.0), (-1.0, 1.0), 0.0), tall)
     source, target = (0.15, -0.08, GRASP_Z), (0.15, 0.08, GRASP_Z)
     fetch = plan.fetch(source)
     free = plan.deliver(fetch.end, target)
     carried = free.gripper[free.holding]
     standing = carried[np.abs(carried[:, 1]).argmin()][None, :2]
     allowed = plan.options.clearance
-    assert clearance.to_standing(free.angles[free.holding][::3], standing, True)[0] < allowed
+    assert clearance.to_standing(free.angles[free.holding][::3], standing, True).distance < allowed
     around = plan.deliver(fetch.end, target, standing)
-    assert clearance.to_standing(around.angles[around.holding][::3], standing, True)[0] > 0.9 * allowed
-    assert clearance.to_standing(around.angles[~around.holding][::3], standing, False)[0] > 0.9 * allowed
+    assert clearance.to_standing(around.angles[around.holding][::3], standing, True).distance > 0.9 * allowed
+    assert clearance.to_standing(around.angles[~around.holding][::3], standing, False).distance > 0.9 * allowed
     assert_playable(name, around, fetch.angles[-1])
 
 

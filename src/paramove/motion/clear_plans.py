@@ -14,7 +14,7 @@ from paramove.motion.clearance import ClearanceChecker
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.joint_path import joined, joint_motion
 from paramove.motion.planned_motion import PlannedMotion, RestPose
-from paramove.motion.plans import NoPlanError
+from paramove.motion.plans import NoPlanError, check_number
 from paramove.motion.relocation import RelocationPlanner
 
 MIN_CLEARANCE = 0.005  # m, of planned paths from table, body and standing objects
@@ -82,11 +82,16 @@ class ClearPlans:
         return self._first(alternatives, standing, choices)
 
     def hold(self, start: RestPose, position: Floats, standing: Floats) -> PlannedMotion:
-        """Carry a held object to `position` and stay there: straight, else over the start or over the position."""
+        """Carry a held object to `position` and stay there: straight, else over start or position, else above both."""
         here = start.gripper
         corners = [np.array([*side[:2], max(here[2], position[2])]) for side in (here, position)]
-        alternatives = [[], *([self.planner.far_enough(corner)] for corner in corners)]
-        return self._first([partial(self.planner.hold, here, position, via) for via in alternatives], standing)
+        above = [corner + _HIGHER_CARRY for corner in corners]
+        detours: list[list[Floats]] = [[], *([corner] for corner in corners), above]
+        alternatives = [
+            partial(self.planner.hold, here, position, [self.planner.far_enough(corner) for corner in detour])
+            for detour in detours
+        ]
+        return self._first(alternatives, standing)
 
     def leave(self, here: RestPose, opening: float, standing: Floats) -> PlannedMotion:
         """Open the hand and go back to the base pose, withdrawing back, else up."""
@@ -149,12 +154,7 @@ class ClearPlans:
         self, alternatives: Sequence[_Alternative], standing: Floats, choices: Sequence[_Choices] | None = None
     ) -> PlannedMotion:
         """The first reachable and clear alternative; `choices` skips those that would fail like a previous one."""
-        if len(standing) > self._checker.n_standing:
-            raise NoPlanError(
-                f"{len(standing)} objects to keep clear of; at most {self._checker.n_standing} at once are possible"
-            )
-        middle = self._checker.surface_z + self._checker.cylinder.height / 2
-        middles = np.column_stack([standing, np.full(len(standing), middle)])
+        check_number(standing)
         reasons = []
         in_the_way = set()
         next_best: tuple[float, PlannedMotion | None] = (0.0, None)
@@ -167,7 +167,7 @@ class ClearPlans:
             except UnreachablePoseError as error:
                 reasons.append(str(error))
                 continue
-            closest = self._checker.smallest(motion.angles, middles, motion.holding, every=6)
+            closest = self._checker.smallest(motion.angles, standing, motion.holding, every=6)
             if closest.distance >= MIN_CLEARANCE:
                 return motion
             if closest.standing is not None:

@@ -1,9 +1,8 @@
-"""Clearance of planned arm paths from the table, the robot's own body and standing objects."""
+"""Clearance of planned arm motions from the working surface, standing objects and the robot's own body."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -11,16 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.documents import Floats, Ints
+from paramove.motion.gripper_arm import GripperArm
 from paramove.robots import RobotDescription
 
-_FAR = 0.05  # larger distances are not distinguished, m
-_HIDDEN = 10.0
+MAX_STANDING = 8
+FAR_M = 0.05
+"""Larger distances are not distinguished."""
 GRASPED_ABOVE_MIDDLE = 0.011
+_HIDDEN = 10.0
+_ADDED = ("surface", "held", *(f"standing_{k}" for k in range(MAX_STANDING)))
 
 
 @dataclass(frozen=True)
 class WorkSurface:
-    """The box in front of the robot whose upper face is the working plane; shoulder frame, m."""
+    """A box whose upper face is the working plane; frame of the arm's base, m."""
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -38,11 +41,11 @@ class UprightCylinder:
 
 @dataclass(frozen=True)
 class Clearance:
-    """The closest approach of a path.
+    """The closest approach of a motion.
 
     Attributes:
         distance: m; at most 0.05.
-        sample: Which sample of the path.
+        sample: Which sample of the motion.
         pair: The two parts.
         standing: Which of the standing objects; None if it is something else.
     """
@@ -56,152 +59,172 @@ class Clearance:
 class ClearanceChecker:
     """Distances between one arm of a robot and what surrounds it, by MuJoCo's own collision shapes.
 
+    Angles are those of the arm, [K, J + 1], rad; positions are in the frame of the arm's base, m.
+
     Args:
-        robot: The robot's description.
-        side: Which arm.
+        robot: The robot's description; joints of other parts are in the base pose.
+        arm: Which arm.
         surface: The working surface.
-        cylinder: The standing objects' shape.
-        n_standing: Maximum number of standing objects.
+        cylinder: Shape of the standing objects, one of which may be held; then it is upright.
+
+    Raises ValueError or KeyError if the robot's model does not fit its description.
     """
 
     def __init__(
-        self, robot: RobotDescription, side: str, surface: WorkSurface, cylinder: UprightCylinder, n_standing: int = 3
+        self, robot: RobotDescription, arm: GripperArm, surface: WorkSurface, cylinder: UprightCylinder
     ) -> None:
-        self._robot, self._arm = robot, robot.arm(side)
-        self._cylinder, self._n_standing, self._surface = cylinder, n_standing, surface
-        self._model = self._compile(robot.model_path)
-        self._data = mujoco.MjData(self._model)
-        self._data.qpos[:] = 0.0
-        self._qpos = [int(self._model.jnt_qposadr[self._model.joint(n).id]) for n in robot.joint_names]
-        self._data.qpos[self._qpos] = robot.base_pose
-        self._moving, self._fixed = self._geoms(side)
-        self._held, self._surface_geom = self._model.geom("held").id, self._model.geom("surface").id
-        self._hand_names = {f"{side}_hand", f"{side}_thumb"}
-
-    def _compile(self, model_path: Path) -> mujoco.MjModel:
-        spec = mujoco.MjSpec.from_file(str(model_path))
-        shoulder = np.array(_site(spec, self._arm.sites.shoulder).pos)  # on the torso, axes parallel
-        box, world = self._surface, spec.worldbody
-        low = np.array([box.x[0], box.y[0], box.z - box.thickness])
-        high = np.array([box.x[1], box.y[1], box.z])
-        world.add_geom(
-            name="surface", type=mujoco.mjtGeom.mjGEOM_BOX, pos=shoulder + (low + high) / 2, size=(high - low) / 2
-        )
-        size = [self._cylinder.radius, self._cylinder.height / 2, 0.0]
-        for k in range(self._n_standing):
-            body = world.add_body(name=f"standing_{k}", mocap=True, pos=[_HIDDEN, _HIDDEN, 0.0])
-            body.add_geom(name=f"standing_{k}", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size)
-        gripper = _site(spec, self._arm.sites.gripper)
-        held = gripper.parent.add_geom(name="held", type=mujoco.mjtGeom.mjGEOM_CYLINDER, pos=gripper.pos, size=size)
-        held.pos = np.array(gripper.pos) + np.array([0.0, 0.0, -GRASPED_ABOVE_MIDDLE])  # grasped above the middle
-        self._shoulder = shoulder
-        return spec.compile()
-
-    def _geoms(self, side: str) -> tuple[list[int], list[int]]:
-        model = self._model
-        collides = [g for g in range(model.ngeom) if model.geom_contype[g] or model.geom_conaffinity[g]]
-        chain = _bodies_below(model, f"{side}_upper_arm")
-        moving = [g for g in collides if int(model.geom_bodyid[g]) in chain and model.geom(g).name != "held"]
-        own_shoulder = {f"{side}_shoulder_bracket"}
-        fixed = [
-            g
-            for g in collides
-            if int(model.geom_bodyid[g]) not in chain
-            and not model.geom(g).name.startswith(("standing", "surface"))
-            and model.body(int(model.geom_bodyid[g])).name not in own_shoulder
+        self.surface, self.cylinder = surface, cylinder
+        self._model = model = _compiled(robot, surface, cylinder)
+        self._data = data = mujoco.MjData(model)
+        data.qpos[[int(model.joint(name).qposadr[0]) for name in robot.joint_names]] = robot.base_pose
+        self._qpos = [int(model.joint(name).qposadr[0]) for name in arm.joints]
+        self._tip = model.site(arm.tip_site).id
+        mujoco.mj_kinematics(model, data)
+        self._base = np.array(data.site(arm.base_site).xpos)
+        self._surface, self._held = (model.geom(name).id for name in ("surface", "held"))
+        middle = [sum(surface.x) / 2, sum(surface.y) / 2, surface.z - surface.thickness / 2]
+        self._surface_middle = self._base + np.array(middle)
+        self._upright = [model.geom(f"standing_{k}").id for k in range(MAX_STANDING)]
+        collides = [
+            geom
+            for geom in np.flatnonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0)).tolist()
+            if model.geom(geom).name not in _ADDED
         ]
-        return moving, fixed
-
-    @property
-    def surface_z(self) -> float:
-        """Height of the working plane, m, shoulder frame."""
-        return self._surface.z
+        chain = self._bodies_below(model.joint(arm.joints[0]))
+        hand = self._bodies_below(model.joint(arm.joints[-2]))
+        self._moving = [geom for geom in collides if int(model.geom_bodyid[geom]) in chain]
+        self._hand = [geom for geom in self._moving if int(model.geom_bodyid[geom]) in hand]
+        self._fixed = [geom for geom in collides if geom not in self._moving]
 
     @property
     def grasp_height(self) -> float:
-        """Height at which a standing object is grasped, m, shoulder frame."""
-        return self._surface.z + self._cylinder.height / 2 + GRASPED_ABOVE_MIDDLE
-
-    @property
-    def n_standing(self) -> int:
-        """Maximum number of standing objects to keep clear of."""
-        return self._n_standing
-
-    @property
-    def cylinder(self) -> UprightCylinder:
-        """Shape of the standing objects."""
-        return self._cylinder
+        """Height at which a standing object is grasped, m."""
+        return self.surface.z + self.cylinder.height / 2 + GRASPED_ABOVE_MIDDLE
 
     def smallest(self, angles: ArrayLike, standing: ArrayLike, holding: ArrayLike, every: int = 2) -> Clearance:
-        """The closest approach along a path.
+        """The closest approach of the arm to surface and objects, of its hand to the body, and of what it holds.
 
         Args:
-            angles: Arm joints and fingers, [K, 6], rad.
-            standing: Middles of standing objects to keep clear of, [M, 3], shoulder frame.
+            angles: The motion.
+            standing: Standing objects to keep clear of, [M, 2].
             holding: Whether an object is held, [K]; it is kept clear of the standing ones.
             every: Check every so many samples.
         """
-        q = np.asarray(angles, dtype=np.float64)
-        held = np.asarray(holding, dtype=bool)
-        upright = self._place(np.asarray(standing, dtype=np.float64).reshape(-1, 3))
-        always = self._pairs(upright)
-        holding_too = np.concatenate([always, [[self._held, other] for other in upright]]) if upright else always
-        columns = [self._qpos[i] for i in (*self._arm.indices, self._arm.fingers_index)]
-        worst = Clearance(_FAR, 0, ("", ""))
-        for k in range(0, len(q), every):
-            self._data.qpos[columns] = q[k]
-            mujoco.mj_kinematics(self._model, self._data)
-            for one, two in self._near(holding_too if held[k] else always, worst.distance):
-                distance = mujoco.mj_geomDistance(self._model, self._data, one, two, _FAR, None)
-                if distance < worst.distance:
-                    number = upright.index(two) if two in upright else None
-                    worst = Clearance(distance, k, (self._name(one), self._name(two)), number)
-        return worst
+        upright = self._stand(standing)
+        pairs = [(one, other) for one in self._moving for other in (self._surface, *upright)]
+        pairs += [(one, other) for one in self._hand for other in self._fixed]
+        return self._closest(angles, np.array(pairs), upright, holding, every)
 
-    def _pairs(self, upright: list[int]) -> Ints:
-        """Shapes whose distance counts, [P, 2], without a held object."""
-        pairs = [(g, other) for g in self._moving for other in (self._surface_geom, *upright)]
-        pairs += [(g, other) for g in self._hand_geoms for other in self._fixed]
-        return np.array(pairs, dtype=np.int64)
+    def to_standing(self, angles: ArrayLike, standing: ArrayLike, holding: ArrayLike) -> Clearance:
+        """As `smallest`, from standing objects alone, in every sample."""
+        upright = self._stand(standing)
+        pairs = [(one, other) for one in self._moving for other in upright]
+        return self._closest(angles, np.array(pairs), upright, holding, 1)
+
+    def heights(self, angles: Floats) -> Floats:
+        """Of the arm's lowest point above the plane of the surface, [K], m."""
+        heights = np.empty(len(angles))
+        for number, row in enumerate(angles):
+            self._place(row)
+            heights[number] = self._lowest() - self._base[2] - self.surface.z
+        return heights
+
+    def touching(self, angles: Floats) -> tuple[str, str] | None:
+        """Two bodies of the robot that touch in one of the poses, the fingers aside; None if none do."""
+        for row in angles:
+            self._place(row)
+            mujoco.mj_fwdPosition(self._model, self._data)
+            for contact in self._data.contact[: self._data.ncon]:
+                bodies = [int(self._model.geom_bodyid[geom]) for geom in contact.geom]
+                if len({int(self._model.body_parentid[body]) for body in bodies}) == 2:
+                    first, second = (self._model.body(body).name for body in bodies)
+                    return first, second
+        return None
+
+    def _closest(self, angles: ArrayLike, pairs: Ints, upright: list[int], holding: ArrayLike, every: int) -> Clearance:
+        q = np.asarray(angles, dtype=np.float64)
+        held = np.broadcast_to(np.asarray(holding, dtype=bool), len(q))
+        held_too = np.concatenate([pairs, [[self._held, other] for other in upright]]) if upright else pairs
+        worst = Clearance(FAR_M, 0, ("", ""))
+        for k in range(0, len(q), every):
+            self._place(q[k], bool(held[k]) and bool(upright))
+            for one, other in self._near(held_too if held[k] else pairs, worst.distance):
+                distance = mujoco.mj_geomDistance(self._model, self._data, one, other, FAR_M, None)
+                if distance < worst.distance:
+                    number = upright.index(other) if other in upright else None
+                    worst = Clearance(distance, k, (self._name(one), self._name(other)), number)
+        return worst
 
     def _near(self, pairs: Ints, distance: float) -> list[tuple[int, int]]:
         """The pairs that may be closer than `distance`, by the spheres around them; the surface is a box, exactly."""
-        one, two = pairs.T
-        away, radius = self._data.geom_xpos[one] - self._data.geom_xpos[two], self._model.geom_rbound
-        apart = np.linalg.norm(away, axis=1) - radius[two]
-        over = two == self._surface_geom
-        beyond = np.maximum(np.abs(away[over]) - self._model.geom_size[self._surface_geom], 0.0)
+        one, other = pairs.T
+        away, radius = self._data.geom_xpos[one] - self._data.geom_xpos[other], self._model.geom_rbound
+        apart = np.linalg.norm(away, axis=1) - radius[other]
+        over = other == self._surface
+        beyond = np.maximum(np.abs(away[over]) - self._model.geom_size[self._surface], 0.0)
         apart[over] = np.linalg.norm(beyond, axis=1)
         return [(int(a), int(b)) for a, b in pairs[apart - radius[one] < distance]]
 
-    @property
-    def _hand_geoms(self) -> list[int]:
-        return [g for g in self._moving if self._model.body(int(self._model.geom_bodyid[g])).name in self._hand_names]
+    def _stand(self, standing: ArrayLike) -> list[int]:
+        """Puts up the standing objects; their shapes."""
+        places = np.asarray(standing, dtype=np.float64).reshape(-1, 2)
+        if len(places) > MAX_STANDING:
+            raise ValueError(f"{len(places)} standing objects, expected at most {MAX_STANDING}")
+        self._data.mocap_pos[:] = _HIDDEN
+        self._data.mocap_pos[self._mocap(self._surface)] = self._surface_middle
+        z = self.surface.z + self.cylinder.height / 2
+        for geom, (x, y) in zip(self._upright, places, strict=False):
+            self._data.mocap_pos[self._mocap(geom)] = self._base + np.array([x, y, z])
+        return self._upright[: len(places)]
 
-    def _place(self, standing: Floats) -> list[int]:
-        if len(standing) > self._n_standing:
-            raise ValueError(f"{len(standing)} standing objects; this checker was made for {self._n_standing}")
-        self._data.mocap_pos[:] = [_HIDDEN, _HIDDEN, 0.0]
-        for k, middle in enumerate(standing):
-            body = self._model.body(f"standing_{k}").mocapid[0]
-            self._data.mocap_pos[body] = self._shoulder + middle
-        return [self._model.geom(f"standing_{k}").id for k in range(len(standing))]
+    def _place(self, row: Floats, holding: bool = False) -> None:
+        """Puts the joints there, those that are coupled to them, and what is held."""
+        model, data = self._model, self._data
+        data.qpos[self._qpos] = row
+        for i in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
+            follower, leader = (int(model.jnt_qposadr[joint[i]]) for joint in (model.eq_obj1id, model.eq_obj2id))
+            data.qpos[follower] = np.polyval(model.eq_data[i, 4::-1], data.qpos[leader])
+        mujoco.mj_kinematics(model, data)
+        if holding:
+            data.mocap_pos[self._mocap(self._held)] = data.site_xpos[self._tip] - [0.0, 0.0, GRASPED_ABOVE_MIDDLE]
+            mujoco.mj_kinematics(model, data)
+
+    def _lowest(self) -> float:
+        """Height of the lowest point of boxes and cylinders, of other shapes that of a ball around them; world, m."""
+        geoms, model = self._moving, self._model
+        upright = self._data.geom_xmat[geoms].reshape(-1, 3, 3)[:, 2]  # how far each own axis points up
+        size, kind = model.geom_size[geoms], model.geom_type[geoms]
+        box = (np.abs(upright) * size).sum(axis=1)
+        below = np.where(kind == mujoco.mjtGeom.mjGEOM_BOX, box, model.geom_rbound[geoms])
+        across = np.sqrt(np.maximum(0.0, 1.0 - upright[:, 2] ** 2))
+        cylinder = size[:, 1] * np.abs(upright[:, 2]) + size[:, 0] * across
+        below = np.where(kind == mujoco.mjtGeom.mjGEOM_CYLINDER, cylinder, below)
+        return float((self._data.geom_xpos[geoms, 2] - below).min())
+
+    def _mocap(self, geom: int) -> int:
+        return int(self._model.body_mocapid[self._model.geom_bodyid[geom]])
+
+    def _bodies_below(self, joint: Any) -> set[int]:
+        below = {int(joint.bodyid[0])}
+        for body in range(min(below) + 1, self._model.nbody):
+            if int(self._model.body_parentid[body]) in below:
+                below.add(body)
+        return below
 
     def _name(self, geom: int) -> str:
         return str(self._model.geom(geom).name or self._model.body(int(self._model.geom_bodyid[geom])).name)
 
 
-def _site(spec: mujoco.MjSpec, name: str) -> Any:
-    site = spec.site(name)
-    if site is None:
-        raise ValueError(f"the model has no site {name!r}; it has {', '.join(one.name for one in spec.sites)}")
-    return site
-
-
-def _bodies_below(model: mujoco.MjModel, name: str) -> set[int]:
-    root = model.body(name).id
-    below = {root}
-    for body in range(root + 1, model.nbody):
-        if int(model.body_parentid[body]) in below:
-            below.add(body)
-    return below
+def _compiled(robot: RobotDescription, surface: WorkSurface, cylinder: UprightCylinder) -> mujoco.MjModel:
+    """The robot's model with the surface and hidden cylinders, which collide with nothing by themselves."""
+    spec = mujoco.MjSpec.from_file(str(robot.model_path))
+    alone = {"contype": 0, "conaffinity": 0}
+    half = [(surface.x[1] - surface.x[0]) / 2, (surface.y[1] - surface.y[0]) / 2, surface.thickness / 2]
+    size = [cylinder.radius, cylinder.height / 2, 0.0]
+    for name in _ADDED:
+        body = spec.worldbody.add_body(name=name, mocap=True, pos=[_HIDDEN, _HIDDEN, _HIDDEN])
+        if name == "surface":
+            body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_BOX, size=half, **alone)
+        else:
+            body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size, **alone)
+    return spec.compile()

@@ -24,6 +24,7 @@ class GripperArm:
         opened, closed: Angles of the gripper for ξ = 1 and ξ = 0.
         felt_opening: Commanded to close, the gripper holds something if it stops at a wider opening ξ than this.
         holding_openings: ξ at which it stops on objects.
+        base_site, tip_site: Sites of the robot's model at the base, and at the end effector.
         end_effector: Position [..., 3], m, of the end effector for angles [..., J] of the arm's joints.
     """
 
@@ -35,6 +36,8 @@ class GripperArm:
     closed: float
     felt_opening: float
     holding_openings: tuple[float, float]
+    base_site: str
+    tip_site: str
     end_effector: Callable[[Floats], Floats]
 
     @classmethod
@@ -45,6 +48,7 @@ class GripperArm:
             joints, frame = (*chain.joints, chain.gripper), ARM_BASE
             opened, closed = chain.gripper_open, chain.gripper_closed
             felt, holding = chain.felt_opening, chain.holding_openings
+            base_site, tip_site = chain.sites.base, chain.sites.end_effector
             kinematics = chain.kinematics
 
             def end_effector(angles: Floats) -> Floats:
@@ -55,6 +59,7 @@ class GripperArm:
             joints, frame = (*arm.joints, arm.fingers), f"{side}_shoulder"
             opened, closed = arm.fingers_open, arm.fingers_closed
             felt, holding = arm.felt_opening, arm.holding_openings
+            base_site, tip_site = arm.sites.shoulder, arm.sites.gripper
 
             def end_effector(angles: Floats) -> Floats:
                 return arm.kinematics.forward(angles).gripper
@@ -62,7 +67,9 @@ class GripperArm:
         indices = robot.indices(joints)
         resolution: Floats = 1.0 / np.abs(robot.units.counts_per_rad[indices])
         base_angles = robot.base_pose[indices]
-        return cls(joints, frame, base_angles, resolution, opened, closed, felt, holding, end_effector)
+        return cls(
+            joints, frame, base_angles, resolution, opened, closed, felt, holding, base_site, tip_site, end_effector
+        )
 
     def opening_of(self, angle: float) -> float:
         """ξ of an angle of the gripper, clipped to 0 … 1."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
-from paramove.motion.table_clearance import TableClearance
+from paramove.motion.clearance import ClearanceChecker
 from paramove.robots import Chain, OutOfReachError
 
 MIN_HEIGHT = 0.0005
@@ -27,7 +27,7 @@ class HandPoses:
         gripper: Angle of the gripper for which the table is kept clear, rad.
     """
 
-    def __init__(self, chain: Chain, clearance: TableClearance, gripper: float) -> None:
+    def __init__(self, chain: Chain, clearance: ClearanceChecker, gripper: float) -> None:
         self._chain, self._clearance, self._gripper = chain, clearance, gripper
 
     def pitch_at(self, target: ArrayLike, preferred: float, band: tuple[float, float]) -> float:

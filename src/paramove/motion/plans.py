@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from paramove.documents import Floats
+from paramove.motion.clearance import MAX_STANDING
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.planned_motion import PlannedMotion, RestPose
 
@@ -19,6 +20,12 @@ class NoPlanError(ValueError):
     def __init__(self, message: str, in_the_way: frozenset[int] = frozenset()) -> None:
         super().__init__(message)
         self.in_the_way = in_the_way
+
+
+def check_number(standing: Floats) -> None:
+    """Raises NoPlanError for more standing objects [M, 2] than can be kept clear of."""
+    if len(standing) > MAX_STANDING:
+        raise NoPlanError(f"{len(standing)} objects to keep clear of; at most {MAX_STANDING} at once are possible")
 
 
 class MotionPlans(Protocol):

@@ -15,15 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
-from paramove.motion.clearance import UprightCylinder
+from paramove.motion.clearance import ClearanceChecker, UprightCylinder, WorkSurface
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.hand_poses import HandPoses, metres
 from paramove.motion.learned_path import SMOOTHING, LearnedPath, PlacedPerson
 from paramove.motion.modelled_movement import robot_movement
 from paramove.motion.planar_path import NoJointPathError, planar_path
 from paramove.motion.planned_motion import PlannedMotion, RestPose
-from paramove.motion.plans import NoPlanError
-from paramove.motion.table_clearance import MAX_STANDING, TableClearance
+from paramove.motion.plans import NoPlanError, check_number
 from paramove.motion.timing import minimum_jerk, ramped, rest_to_rest, smoothed
 from paramove.phmm import ParametricHMM
 from paramove.robots import DescriptionError, OutOfReachError, RobotDescription
@@ -34,6 +33,7 @@ _FRACTIONS = (1.0, 0.6, 0.3, 0.0)
 _ARCHES_M = (0.0, 0.02, 0.04, 0.07, 0.10)
 _CHECKED_EVERY = 3
 _GAP_TO_ENDS_M = 0.0005
+_TABLE_M = 1.0  # to each side of the base
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -81,7 +81,8 @@ class ServoArmReaching:
         self._limits = (velocity, acceleration, jerk)
         self.start_tolerance = float(np.deg2rad(description.stream.start_tolerance_deg))
         self._period = description.stream.period_us * 1e-6
-        self._clearance = TableClearance(description, chain, o.table_z, cylinder)
+        table = WorkSurface((-_TABLE_M, _TABLE_M), (-_TABLE_M, _TABLE_M), o.table_z)
+        self._clearance = ClearanceChecker(description, self.arm, table, cylinder or UprightCylinder())
         self._poses = HandPoses(chain, self._clearance, self.arm.angle_of(o.work_opening))
         length = float(np.hypot(*self._arm.upper_arm) + np.hypot(*self._arm.forearm) + self._arm.hand[0])
         middle = self._poses.middle(o.table_z, self._band(o.grasp_band_deg))
@@ -310,11 +311,12 @@ class ServoArmReaching:
             return f"its {touching[0]} would touch its {touching[1]}"
         if not len(motion.standing):
             return ""
-        distance, at, number = self._clearance.to_standing(checked, motion.standing, holding)
-        if distance >= self.options.clearance:
+        closest = self._clearance.to_standing(checked, motion.standing, holding)
+        if closest.standing is None or closest.distance >= self.options.clearance:
             return ""
-        motion.in_the_way.add(number)
-        return f"it would come within {1000 * distance:.1f} mm of a standing object at {metres(hand[at])}"
+        motion.in_the_way.add(closest.standing)
+        where = metres(hand[closest.sample])
+        return f"it would come within {1000 * closest.distance:.1f} mm of a standing object at {where}"
 
     # Positions
 
@@ -323,8 +325,7 @@ class ServoArmReaching:
         if angles.shape != self.base_angles.shape or not np.isfinite(angles).all():
             names = ", ".join(self.arm.joints)
             raise ValueError(f"expected a start with the angles of {names}, found {angles.tolist()}")
-        if len(standing) > MAX_STANDING:
-            raise NoPlanError(f"{len(standing)} objects to keep clear of; at most {MAX_STANDING} at once are possible")
+        check_number(standing)
         outside = np.maximum(self.lower - angles, angles - self.upper)
         if outside.max() > self.start_tolerance:
             joint, degrees = self.arm.joints[int(outside.argmax())], np.rad2deg(outside.max())

@@ -104,9 +104,9 @@ def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: 
         robot.operating_velocity[joints],
         robot.operating_acceleration[joints],
     )
-    box = WorkSurface(surface.x, surface.y, surface.z)
+    box, gripper_arm = WorkSurface(surface.x, surface.y, surface.z), GripperArm.of(robot, side)
     try:
-        checker = ClearanceChecker(robot, side, box, cylinder)
+        checker = ClearanceChecker(robot, gripper_arm, box, cylinder)
     except (KeyError, ValueError) as error:
         raise DescriptionError(f"{robot.model_path} does not fit the robot's description: {error}") from error
-    return ClearPlans(GripperArm.of(robot, side), planner, checker)
+    return ClearPlans(gripper_arm, planner, checker)
