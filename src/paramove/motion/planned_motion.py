@@ -40,15 +40,7 @@ class RelocationOptions:
     reach_width: float = 0.012  # and begins to be moved outward from twice so much on
     turn_smoothing: float = 0.15  # s, over which a turn of the elbow rises and falls
     blend_share: float = 0.45  # part of the approach over which the robot's own base pose fades into the movement
-    begin_within: tuple[tuple[float, float], ...] = ((0.128, 0.15), (-0.06, -0.01), (-0.04, -0.015))
-    """x, y, z of where a movement may begin that begins above the table: clear of torso, smallest reach and objects."""
-    raise_via_deg: tuple[tuple[float, ...], ...] = (
-        (142.0, -20.0, 28.0, -107.0, 68.0),
-        (133.0, -45.0, 36.0, -109.0, 70.0),
-        (112.0, -55.0, 25.0, -109.0, 50.0),
-    )
-    """Round the table's edge, from the base pose to where a movement begins that begins above the table."""
-    raise_duration: float = 1.6  # from the base pose to there
+    raise_duration: float = 1.6  # from the base pose to where a movement begins that begins above the table
     sample_period: float = 0.005
 
 

@@ -17,7 +17,7 @@ from paramove.motion.arm_pose import ArmPoseSolver
 from paramove.motion.planned_motion import Path, PlannedMotion, RelocationOptions
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.motion.timing import fade_in, largest_excess, minimum_jerk, resampled, slowed_times, soft_ends
-from paramove.robots import Arm
+from paramove.robots import AboveTablePart, Arm, DescriptionError
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SLOWING_ROUNDS = 6
@@ -36,6 +36,8 @@ class RelocationPlanner:
         velocity: Largest speed of the five joints and the fingers, [6], rad/s.
         acceleration: Largest acceleration of them, [6], rad/s².
         options: Sizes.
+
+    Raises DescriptionError for a movement that begins above a table, and an arm that has no `above_table`.
     """
 
     def __init__(
@@ -50,6 +52,10 @@ class RelocationPlanner:
     ) -> None:
         self.movement, self.solver, self.arm = movement, solver, arm
         self.options = options or RelocationOptions()
+        if movement.begins_above_table and arm.above_table is None:
+            raise DescriptionError(
+                f"the arm of {arm.joints[0]} has no above_table in its robot.yaml; this movement begins above a table"
+            )
         self.velocity = np.asarray(velocity, dtype=np.float64)
         self.acceleration = np.asarray(acceleration, dtype=np.float64)
         self.base_angles = base = np.asarray(base_angles, dtype=np.float64)
@@ -184,11 +190,16 @@ class RelocationPlanner:
         poses = ArmPoses(poses.elbow, self._outward(poses.gripper), poses.finger_to_thumb)
         path.add(name, poses, np.clip(values[:, 9], 0.0, 1.0), np.clip(values[:, 10], 0.0, 1.0))
 
+    @property
+    def _above_table(self) -> AboveTablePart:
+        assert self.arm.above_table is not None  # checked when the planner is made
+        return self.arm.above_table
+
     def _way_to_table(self, path: Path, name: str, begin: ArmPoses, backwards: bool = False) -> None:
         """From the base pose to where the movement begins, or back: no movement of people, who sit at the table."""
         o = self.options
         first = self.solver.solve(begin.elbow, self._outward(begin.gripper), begin.finger_to_thumb).angles[0]
-        corners = np.concatenate([self.base_angles[None, :5], np.deg2rad(o.raise_via_deg), first[None]])
+        corners = np.concatenate([self.base_angles[None, :5], np.deg2rad(self._above_table.via_deg), first[None]])
         at = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(corners, axis=0)).max(axis=1))])
         n = max(2, round(o.raise_duration / path.period))
         along = minimum_jerk((np.arange(n, 0, -1) - 1 if backwards else np.arange(1, n + 1)) / n)
@@ -258,7 +269,7 @@ class RelocationPlanner:
         o = self.options
         if not self.movement.begins_above_table:
             return self._blended(states, self._base, o.blend_share)
-        gripper = np.clip(states.gripper[:1], *np.transpose(o.begin_within))
+        gripper = np.clip(states.gripper[:1], *np.transpose(self._above_table.begin_within))
         return self._blended(states, ArmPoses(states.elbow[:1], gripper, states.finger_to_thumb[:1]), 1.0)
 
     def _blended(self, states: ArmPoses, first: ArmPoses, fraction: float) -> ArmPoses:

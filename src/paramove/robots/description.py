@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from paramove.documents import Floats, nearest
 from paramove.robots.arm_kinematics import ArmKinematics
 from paramove.robots.description_file import (
+    AboveTablePart,
     ArmPart,
     ArmSites,
     BusParameters,
@@ -46,6 +47,7 @@ class Arm:
         fingers_open, fingers_closed: Angles of the open (xi = 1) and the closed hand (xi = 0), rad.
         felt_opening, holding_openings: How a held object is detected: see `FingersPart`.
         kinematics: Forward kinematics in the frame of the shoulder site.
+        above_table: How it begins movements that begin above a table; None: it cannot.
     """
 
     joints: tuple[str, ...]
@@ -58,6 +60,7 @@ class Arm:
     holding_openings: tuple[float, float]
     sites: ArmSites
     kinematics: ArmKinematics
+    above_table: AboveTablePart | None = None
 
     def fingers_angle(self, xi: float) -> float:
         """Angle of the finger joint for the opening `xi` in 0 (closed) to 1 (open), rad."""
@@ -259,6 +262,7 @@ def _arm(names: tuple[str, ...], arm: ArmPart) -> Arm:
         holding_openings=arm.fingers.holding_openings,
         sites=arm.sites,
         kinematics=ArmKinematics(arm.upper_arm, arm.gripper_from_elbow, arm.fingertip_from_elbow),
+        above_table=arm.above_table,
     )
 
 

@@ -111,6 +111,18 @@ class ArmSites(_Part):
     fingertip: str
 
 
+class AboveTablePart(_Part):
+    """How a movement is begun that people begin above a table, at which they sit.
+
+    Attributes:
+        begin_within: x, y, z of where it may begin, frame of the shoulder, m: clear of body and objects.
+        via_deg: Angles of the arm's joints on the path from the base pose to there, round the table's edge.
+    """
+
+    begin_within: tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
+    via_deg: tuple[tuple[float, float, float, float, float], ...]
+
+
 class ArmPart(_Part):
     """One arm; lengths in m."""
 
@@ -120,6 +132,7 @@ class ArmPart(_Part):
     upper_arm: float
     gripper_from_elbow: tuple[float, float, float]
     fingertip_from_elbow: tuple[float, float, float]
+    above_table: AboveTablePart | None = None
 
 
 class BusParameters(_Part):
