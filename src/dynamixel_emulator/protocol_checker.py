@@ -38,8 +38,8 @@ class Finding:
     Attributes:
         time_s: Time of receipt, s.
         id: The addressed servo; -1 without one.
-        kind: One of noise, incomplete, length, checksum, stuffing, instruction, register, eeprom, limit, step, torque,
-            watchdog or shut_down.
+        kind: One of noise, incomplete, length, checksum, stuffing, instruction, register, eeprom, range, limit, step,
+            torque, watchdog or shut_down.
         detail: Message: the received data and what is valid.
     """
 
@@ -211,6 +211,9 @@ class ProtocolChecker:
         memory = servo.memory
         if servo.model.registers[name].address < LOCKED_BELOW and memory["Torque Enable"]:
             self._report("eeprom", f"{name} was written while torque is on", servo.id)
+        low, high = servo.model.registers[name].allowed or (None, None)
+        if (low is not None and value < low) or (high is not None and value > high):
+            self._report("range", f"{name} {value} is outside of {low} to {high}", servo.id)
         if name == "Torque Enable":
             self._check_torque(servo, value)
         limits = {

@@ -124,6 +124,16 @@ def test_of_an_ordinary_client_only_what_servos_reject_is_found():
     assert kinds(bus) == ["eeprom", "limit", "noise", "register", "shut_down"]
 
 
+def test_a_value_that_no_servo_accepts_is_reported_also_where_nobody_answers():
+    """As that of ROBOTIS's sample of bulk writes, whose 255 is for servos with a brighter light."""
+    bus = a_bus(servo_rules_only=True)
+    bus.receive(encoded(Packet(BROADCAST, Instruction.SYNC_WRITE, word(LED) + word(1) + b"\1\xff")), BAUD, 0.0)
+    (finding,) = bus.checker.findings
+    assert (finding.kind, finding.id) == ("range", 1)
+    assert "LED 255" in finding.detail
+    assert "0 to 1" in finding.detail
+
+
 def test_goals_beyond_limits_are_reported():
     bus = a_bus()
     bus.receive(write(LIMIT, 3000, 4), BAUD, 1.0)
