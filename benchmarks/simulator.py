@@ -15,14 +15,15 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # the workspace is no installed package
 
 from paramove.msgs.rule_pb2 import Speech
-from sim.scenes import SceneOptions, at_the_tool_box
+from sim.scenes import at_the_tool_box
+from sim.simulator import Config
 
 PERIOD_MS = 1000 / 15
 
 
 def measure(ticks: int, camera: bool, video: bool) -> tuple[float, float]:
     """Milliseconds per tick of physics and of rendering while the instructor shows the rules."""
-    simulation = at_the_tool_box(SceneOptions(camera=camera, video=video))
+    simulation = at_the_tool_box(Config(camera=camera, video=video))
     simulation.person.handle(Speech.REQUEST_SHOW_RULES)
     simulation.run_to_tick(1)
     simulation.shown()

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
-from paramove.robots import RobotDescription, ThisLaunch
+from paramove.robots import RobotDescription, RobotFolder, ThisLaunch
 from paramove.robots.hoap3 import batch_message, state_of
 from paramove.robots.streaming import ArmDriver
 
@@ -27,7 +27,7 @@ PUBLISHES = (topics.WIRE_HOAP3_STREAM, topics.ARM_JOINT_STATES, topics.ARM_TRAJE
 class Config(NodeConfig):
     """`robot`: folder of the robot's description."""
 
-    robot: Path = Path("robot_description/hoap3")
+    robot: RobotFolder = Path("robot_description/hoap3")
 
 
 def run(bus: Bus, config: Config) -> None:

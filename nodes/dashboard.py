@@ -11,7 +11,7 @@ from pydantic import Field
 
 from paramove.bus import Bus, NodeConfig, Received, main, topics
 from paramove.dashboard import LivePicture, PageServer, StopButton, Surface, subscribe_to_nodes
-from paramove.robots import RobotDescription
+from paramove.robots import RobotDescription, RobotFolder
 
 PERCEPTION = (topics.CAMERA_IMAGE, topics.OBJECTS_TRACKED, topics.GESTURES, topics.CALIBRATION_PLANE)
 DECISION = (topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH, topics.RELOCATION_GOAL, topics.RELOCATION_STATUS)
@@ -24,7 +24,7 @@ class Config(NodeConfig):
 
     title: str = Field("paramove", max_length=80)
     port: int = Field(0, ge=0, le=65535)
-    robot: Path = Path("robot_description/hoap3")
+    robot: RobotFolder = Path("robot_description/hoap3")
     surface: Surface = Surface()
 
 

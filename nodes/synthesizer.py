@@ -11,6 +11,7 @@ from pathlib import Path
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.motion import MovementSource, SurfaceParameters, synthesizer_for
+from paramove.robots import RobotFolder
 
 SUBSCRIBES = (topics.RELOCATION_GOAL, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS)
 PUBLISHES = (topics.ARM_TRAJECTORY, topics.RELOCATION_STATUS)
@@ -19,7 +20,7 @@ PUBLISHES = (topics.ARM_TRAJECTORY, topics.RELOCATION_STATUS)
 class Config(NodeConfig):
     """`robot`: folder of the description. `movement`: a model file, or the demonstrations to train from."""
 
-    robot: Path = Path("robot_description/hoap3")
+    robot: RobotFolder = Path("robot_description/hoap3")
     side: str = "right"
     movement: MovementSource = MovementSource()
     surface: SurfaceParameters = SurfaceParameters()

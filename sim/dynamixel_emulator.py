@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic import Field
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
-from paramove.robots import RobotDescription
+from paramove.robots import RobotDescription, RobotFolder
 from sim.emulated_arm import EmulatedArm
 
 SUBSCRIBES = ()
@@ -26,7 +26,7 @@ class Config(NodeConfig):
     themselves reject, not goals that jump.
     """
 
-    robot: Path = Path("robot_description/koch_v1_1")
+    robot: RobotFolder = Path("robot_description/koch_v1_1")
     scene: Path = Path("scene.xml")
     port: Path = Path("by-id/usb-paramove_emulated_servos-if00-port0")
     control: str = ""

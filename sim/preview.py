@@ -18,8 +18,9 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from paramove.bus import topics
 from paramove.documents import Image
 from paramove.msgs.rule_pb2 import Speech
-from sim.scenes import SceneOptions, at_the_tool_box
+from sim.scenes import at_the_tool_box
 from sim.simulation import Simulation
+from sim.simulator import Config
 
 
 def stages(simulation: Simulation) -> Iterator[str]:
@@ -59,7 +60,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=Path("preview.png"))
     arguments = parser.parse_args()
-    simulation = at_the_tool_box(SceneOptions(seed=arguments.seed, video=True))
+    simulation = at_the_tool_box(Config(seed=arguments.seed, video=True))
     pairs = []
     for title in stages(simulation):
         shown = simulation.shown()

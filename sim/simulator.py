@@ -21,12 +21,17 @@ from __future__ import annotations
 import contextlib
 import logging
 import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal, get_args
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from paramove.bus import Bus, LockstepBarrier, main, topics
-from sim.scenes import SceneOptions, build
+from paramove.bus import Bus, LockstepBarrier, NodeConfig, main, topics
+from paramove.robots import RobotFolder
+from sim.scenes import build
 from sim.simulation import CAMERA_HZ, Simulated
+from sim.tool_box import NOMINAL, Measures
 from sim.world import log_warnings_of_mujoco
 
 SUBSCRIBES = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
@@ -49,19 +54,61 @@ FIRMWARE_LOG = "firmware_frames.int16"
 _log = logging.getLogger(__name__)
 
 
-class Config(SceneOptions):
-    """The scene, see `SceneOptions`, and how it runs.
+Scene = Literal["rule_learning", "rule_learning_whole_arm", "relocate_by_pointing", "pointing"]
+Marker = Literal["shoulder", "elbow", "wrist", "index"]
+OF_SCENES: Mapping[frozenset[str], frozenset[str]] = {
+    frozenset({"targets", "views", "markers"}): frozenset({"pointing"}),
+    frozenset({"robot", "camera", "video", "measures"}): frozenset(get_args(Scene)) - {"pointing"},
+    frozenset({"arm_image_every"}): frozenset({"rule_learning_whole_arm", "relocate_by_pointing"}),
+}
+"""Parameters that not every scene has."""
+
+
+class Config(NodeConfig):
+    """The scene, and how it runs.
 
     Attributes:
+        scene: `rule_learning`: HOAP-3 at its tool box, and an instructor of whom one sees a hand.
+            `rule_learning_whole_arm`: the instructor is a whole arm, which two calibrated cameras see.
+            `relocate_by_pointing`: HOAP-3 with one object, and a person who points at free places.
+            `pointing`: a person alone at a table, who points.
+        seed: Of everything random in the world.
+        robot: Folder of the robot's description.
+        camera: Whether cameras' images are rendered; without, no graphics library is needed.
+        video: Whether a view for people is rendered too.
+        measures: Of the tool box and of the nominal camera.
+        arm_image_every: Cameras that look at an arm give an image in every so many ticks of 1/15 s; rendering and
+            tracking take most of the time of a run.
+        targets: Of `pointing`: how often the person points.
+        views: Of `pointing`: which cameras look, from 1.
+        markers: Of `pointing`: points of the arm at which the person wears coloured balls.
         max_duration_s: Simulated time after which the run ends.
         pace: Simulated seconds per second when nobody waits for anybody (not in lockstep).
         firmware_log: Whether every frame that the firmware plays is written to the run folder (56 kB/s), for those who
             judge afterwards whether the arm ever jumped.
     """
 
+    scene: Scene = "rule_learning"
+    seed: int = Field(default=0, ge=0)
+    robot: RobotFolder = Path("robot_description/hoap3")
+    camera: bool = True
+    video: bool = False
+    measures: Measures = NOMINAL
+    arm_image_every: int = Field(default=1, ge=1, le=4)
+    targets: int = Field(default=5, ge=1, le=100)
+    views: tuple[int, ...] = Field(default=(1, 2), min_length=1, max_length=4)
+    markers: tuple[Marker, ...] = ()
     max_duration_s: float = Field(default=600.0, gt=0)
     pace: float = Field(default=1.0, gt=0)
     firmware_log: bool = False
+
+    @model_validator(mode="after")
+    def _has_no_parameter_of_another_scene(self) -> Config:
+        for names, scenes in OF_SCENES.items():
+            unused = sorted(names & self.model_fields_set)
+            if unused and self.scene not in scenes:
+                raise ValueError(f"scene {self.scene} has no {', '.join(unused)}; {', '.join(sorted(scenes))} has")
+        return self
 
 
 def run(bus: Bus, config: Config) -> None:

@@ -102,3 +102,15 @@ def test_stages_have_the_states_that_are_told():
     for _, path, states, _ in table(ARCHITECTURE, "stages"):
         source = (ROOT / "src" / "paramove" / path).read_text(encoding="utf-8")
         assert set(re.findall(r'self\.go\("(\w+)"\)', source)) == set(states.split(", "))
+
+
+def test_every_key_of_a_servo_arm_is_in_the_page_that_adds_one():
+    from paramove.robots import description_file as file
+
+    words = " ".join(row[0] for row in table(ROOT / "docs" / "how-to" / "add_an_arm.md", "robot keys"))
+    parts = (file.RobotFile, file.JointPart, file.MotorPart, file.StreamParameters, file.BusParameters, file.ChainPart)
+    keys = {key for part in parts for key in part.model_fields} - {"firmware", "arms"}
+    text = (ROOT / "docs" / "how-to" / "add_an_arm.md").read_text(encoding="utf-8")
+    assert {key for key in keys if key not in words} == set()
+    gripper = {*file.GripperPart.model_fields, *file.ChainLinks.model_fields, *file.ChainSites.model_fields}
+    assert {key for key in gripper if f"`{key}`" not in text and key != "base"} == set()

@@ -138,6 +138,8 @@ def test_a_robot_of_servos_has_a_bus_and_a_chain_and_hoap3_has_not() -> None:
         ("open_deg: -80", "open_deg: 51", "different angles of the open and the closed gripper"),
         ("open_deg: -80", "open_deg: -90", r"gripper: -90.0 deg is outside -87.0 to 52.7 deg of joint gripper"),
         ("hand: [0.126, 0.0, 0.0]", "hand: [0.126, 0.0]", r"chain\.links\.hand\.2 is missing"),
+        ("servo_id: 12, motor: xm430_w350", "servo_id: 12, motor: xm430_w355", "motor 'xm430_w355'"),
+        ("  xm430_w350: {", "  xm430_w300: {", "motor 'xm430_w350'; known motors are xm430_w300"),
         ("baud_rate: 1000000", "baud_rate: 0", r"bus\.baud_rate: input should be greater than 0"),
     ],
 )
@@ -148,6 +150,20 @@ def test_wrong_files_of_servos_are_refused_with_the_reason(tmp_path: Path, old: 
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(DescriptionError, match=reason):
         RobotDescription.load(path)
+
+
+@pytest.mark.parametrize(
+    ("model", "reason"),
+    [
+        ("xl430_w250", "grip_current_ma.*xl430_w250.*controls no current.*xm430_w350"),
+        ("xl430_w300", "'xl430_w300', which is no model of a servo.* known are .*xl430_w250"),
+    ],
+)
+def test_servos_that_do_not_exist_or_control_no_current_are_named(tmp_path: Path, model: str, reason: str) -> None:
+    text = (FOLDER / "open_manipulator_x" / "robot.yaml").read_text(encoding="utf-8")
+    (tmp_path / "robot.yaml").write_text(text.replace("xm430_w350", model), encoding="utf-8")
+    with pytest.raises(DescriptionError, match=reason):
+        RobotDescription.load(tmp_path)
 
 
 def test_what_needs_an_arm_like_hoap3_refuses_a_robot_of_servos() -> None:

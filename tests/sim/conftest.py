@@ -8,8 +8,9 @@ import pytest
 
 from paramove.robots.description import RobotDescription
 from sim.looks import Looks
-from sim.scenes import Scene, SceneOptions, at_the_tool_box
+from sim.scenes import at_the_tool_box
 from sim.simulation import Simulation
+from sim.simulator import Config, Scene
 from sim.world import World
 
 ROBOT = Path(__file__).resolve().parents[2] / "robot_description" / "hoap3"
@@ -27,4 +28,4 @@ def world(description: RobotDescription) -> World:
 
 def simulated(scene: Scene, seed: int, camera: bool = False, video: bool = False) -> Simulation:
     """A scene of HOAP-3 at its tool box."""
-    return at_the_tool_box(SceneOptions(scene=scene, seed=seed, robot=ROBOT, camera=camera, video=video))
+    return at_the_tool_box(Config(scene=scene, seed=seed, robot=ROBOT, camera=camera, video=video))

@@ -24,8 +24,8 @@ from paramove.workspace import Workspace
 from sim import looks, simulator, tool_box, truth
 from sim.arm import TIP, Arm
 from sim.instructor import SEATED_S, Instructor
-from sim.scenes import Scene
 from sim.simulation import CAMERA_HZ, Simulation
+from sim.simulator import Scene
 from sim.small_person import SmallPerson, shoulder_from_table, turn_of_table
 from sim.tracked_person import TrackedPerson
 from sim.world import OPENINGS_UP

@@ -102,6 +102,19 @@ def test_another_connection_needs_an_overlay_that_says_what_it_is(folder):
         load(folder, "wrong")
 
 
+def test_a_robot_replaces_those_that_the_files_name(folder):
+    robot = "parameters: {robot: koch, x: 1}"
+    (folder / "arms.yaml").write_text(
+        f"nodes: {{a: {{module: m, {robot}}}, b: {{module: m}}, c: {{module: m, {robot}}}}}"
+    )
+    launch = load(folder, "arms", settings=["c.robot=other"], robot="px100")
+    given = {name: node.parameters for name, node in launch.file.nodes.items()}
+    assert given == {"a": {"robot": "px100", "x": 1}, "b": {}, "c": {"robot": "other", "x": 1}}
+    (folder / "plain.yaml").write_text("nodes: {a: {module: m}}")
+    with pytest.raises(DocumentError, match=r"--robot px100.*no node of this launch file names a robot"):
+        load(folder, "plain", robot="px100")
+
+
 def test_seed_without_a_taker_is_refused(folder):
     (folder / "plain.yaml").write_text("nodes: {a: {module: m}}")
     with pytest.raises(DocumentError, match="has no 'seed_parameters'"):

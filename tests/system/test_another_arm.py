@@ -49,10 +49,9 @@ def test_an_arm_that_is_a_folder_reaches_and_relocates(launcher, tmp_path):
     robot = described(tmp_path)
     joints = RobotDescription.load(robot).joint_names
     assert {"turn", "bend"} < set(joints)
-    nodes = [f"{node}.robot={robot}" for node in ("arm_driver", "synthesizer", "dynamixel_emulator")]
     tasks = "reacher.tasks=[{reach: [0.22, 0.06, 0.11]}, {pick: [0.16, 0.0, 0.012], place: [0.21, 0.03, 0.012]}]"
-    options = [word for one in (*nodes, tasks) for word in ("--set", one)]
-    code, shown = launcher.run("dynamixel_arm", "--with", "emulated", "--headless", *options)
+    options = ["--with", "emulated", "--headless", "--robot", str(robot), "--set", tasks]
+    code, shown = launcher.run("dynamixel_arm", *options)
     assert code == 0, shown
     results = json.loads((launcher.latest / "run.json").read_text())["tasks"]
     assert [one["task"] for one in results] == ["reach", "place"]

@@ -10,7 +10,8 @@ from paramove.bus import topics
 from paramove.recording.parts import PartedRecording
 from sim.arm import TIP
 from sim.instructor import SEATED_S
-from sim.scenes import SceneOptions, at_the_tool_box
+from sim.scenes import at_the_tool_box
+from sim.simulator import Config
 from tests.system.conftest import ROOT
 
 SEED = 4
@@ -29,7 +30,7 @@ def test_a_seated_arm_is_tracked_in_lockstep_and_told_in_the_robots_frame(launch
     times_s = np.array([one.captured.ToNanoseconds() for one in estimates]) * 1e-9
     assert np.allclose(np.diff(times_s), 2 / 15, rtol=0, atol=0.002), shown  # every second tick, and none is left out
     robot = ROOT / "robot_description" / "hoap3"
-    simulation = at_the_tool_box(SceneOptions(scene="rule_learning_whole_arm", seed=SEED, robot=robot, camera=False))
+    simulation = at_the_tool_box(Config(scene="rule_learning_whole_arm", seed=SEED, robot=robot, camera=False))
     assert simulation.person.arm is not None
     simulation.run_to_tick(15)
     tip = simulation.person.arm.posture[TIP]

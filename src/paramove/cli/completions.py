@@ -31,6 +31,11 @@ def overlays(incomplete: str) -> list[str]:
     return _beginning(incomplete, sorted(found))
 
 
+def robots(incomplete: str) -> list[str]:
+    """Names of the robots that are described."""
+    return _beginning(incomplete, Workspace.here().robots())
+
+
 def schemas(incomplete: str) -> list[str]:
     """Kinds of files that have a schema."""
     return _beginning(incomplete, ("launch", "overlay"))

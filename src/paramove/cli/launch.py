@@ -51,6 +51,14 @@ def launch(
         ),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="seed of the world", min=0)] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROBOT",
+            help="folder of the robot, or its name in robot_description/, for every node that names one",
+            autocompletion=completions.robots,
+        ),
+    ] = None,
     headless: Annotated[bool, typer.Option("--headless", help="lines instead of the live table, and no video")] = False,
     page: Annotated[
         bool, typer.Option("--view", help="show the run on a page in the browser, on this machine, with a stop button")
@@ -77,7 +85,7 @@ def launch(
     """
     from paramove.cli.one_run import RunOptions, run  # heavy, and not needed to complete a line or to print help
 
-    raise typer.Exit(run(RunOptions(name, overlays, settings or [], seed, headless, runs, page), check))
+    raise typer.Exit(run(RunOptions(name, overlays, settings or [], seed, headless, runs, page, robot), check))
 
 
 if __name__ == "__main__":

@@ -51,6 +51,7 @@ class RunOptions:
     headless: bool
     runs: Path | None
     page: bool = False
+    robot: str | None = None
 
 
 def run(options: RunOptions, check_only: bool) -> int:
@@ -72,7 +73,7 @@ def _run(options: RunOptions, check_only: bool, output: QueuedOutput) -> int:
         if options.page:
             overlays, title = with_page(workspace, options.name, overlays)
             settings.insert(0, title)
-        launch = load(workspace, options.name, overlays, settings, options.seed, options.headless)
+        launch = load(workspace, options.name, overlays, settings, options.seed, options.headless, options.robot)
         if check_only:
             application.check(launch, workspace)
             console.print("\n".join(_found(launch, environment, workspace)), soft_wrap=True)

@@ -55,6 +55,11 @@ class ArmState:
         """Whether the arm is known to be at its base pose."""
         return self.known and self.pose is None
 
+    @property
+    def felt(self) -> str:
+        """What was measured where nothing was felt, and what would count as something."""
+        return f"the gripper stopped at an opening of {self.measured:.3f}, felt_opening is {self._arm.felt_opening:g}"
+
     def handle(self, message: JointStates, now_ns: int) -> bool:
         """Updates with the measured joints; returns False, without a change, if one is missing or not finite."""
         measured = {joint.name: joint.position for joint in message.joints}

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from paramove.documents import Floats, Ints
 from paramove.motion.gripper_arm import GripperArm
+from paramove.motion.model_check import check_model
 from paramove.robots import RobotDescription
 
 MAX_STANDING = 8
@@ -67,7 +68,7 @@ class ClearanceChecker:
         surface: The working surface.
         cylinder: Shape of the standing objects, one of which may be held; then it is upright.
 
-    Raises ValueError or KeyError if the robot's model does not fit its description.
+    Raises DescriptionError if the robot's model does not fit its description.
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class ClearanceChecker:
     ) -> None:
         self.surface, self.cylinder = surface, cylinder
         self._model = model = _compiled(robot, surface, cylinder)
+        check_model(robot, arm, model)
         self._data = data = mujoco.MjData(model)
         data.qpos[[int(model.joint(name).qposadr[0]) for name in robot.joint_names]] = robot.base_pose
         self._qpos = [int(model.joint(name).qposadr[0]) for name in arm.joints]

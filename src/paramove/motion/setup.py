@@ -22,7 +22,7 @@ from paramove.motion.relocation import RelocationPlanner
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.motion.synthesizer import Synthesizer
 from paramove.phmm import ParametricHMM
-from paramove.robots import DescriptionError, RobotDescription
+from paramove.robots import RobotDescription
 
 _log = logging.getLogger(__name__)
 
@@ -105,8 +105,4 @@ def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: 
         robot.operating_acceleration[joints],
     )
     box, gripper_arm = WorkSurface(surface.x, surface.y, surface.z), GripperArm.of(robot, side)
-    try:
-        checker = ClearanceChecker(robot, gripper_arm, box, cylinder)
-    except (KeyError, ValueError) as error:
-        raise DescriptionError(f"{robot.model_path} does not fit the robot's description: {error}") from error
-    return ClearPlans(gripper_arm, planner, checker)
+    return ClearPlans(gripper_arm, planner, ClearanceChecker(robot, gripper_arm, box, cylinder))

@@ -210,8 +210,9 @@ class Synthesizer:
         onwards = then(fetch.end, target, standing)  # known to be possible before the arm moves
         yield fetch
         if not self.holding:
+            felt = self._hand.felt
             yield self._plans.leave(fetch.end, self._hand.opening, standing)
-            return _Outcome(False, f"felt nothing in the hand at {centimetres(source)} cm")
+            return _Outcome(False, f"felt nothing in the hand at {centimetres(source)} cm: {felt}")
         yield onwards
         return self._placed(target)
 
@@ -224,8 +225,9 @@ class Synthesizer:
         yield plans.fingers(here, self._hand.opening, plans.closed_opening, standing_of(goal))
         if self.holding:
             return _Outcome(True)
+        felt = self._hand.felt
         yield plans.fingers(here, self._hand.opening, plans.offer_opening, standing_of(goal))
-        return _Outcome(False, "closed the hand and felt nothing")
+        return _Outcome(False, f"closed the hand and felt nothing: {felt}")
 
     def _release(self, goal: RelocationGoal) -> _Course:
         opening = self._plans.offer_opening

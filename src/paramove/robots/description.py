@@ -9,9 +9,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator
 
 from paramove.documents import Floats, nearest
 from paramove.robots.arm_kinematics import ArmKinematics
@@ -204,6 +206,18 @@ class RobotDescription:
         if path.is_dir():
             path = path / "robot.yaml"
         return _assemble(path, read_robot_file(path))
+
+
+def _described(path: Path) -> Path:
+    try:
+        RobotDescription.load(path)
+    except DescriptionError as error:
+        raise ValueError(str(error)) from error
+    return path
+
+
+RobotFolder = Annotated[Path, AfterValidator(_described)]
+"""Parameter of a node: what `RobotDescription.load` takes, and accepts."""
 
 
 def _assemble(path: Path, file: RobotFile) -> RobotDescription:

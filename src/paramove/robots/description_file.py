@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from paramove.documents import InputError, findings, read_document
+from paramove.documents import InputError, findings, nearest, read_document
 from paramove.workspace import Workspace
 
 POSITION_MODE_MAXIMUM = 4095
@@ -251,12 +251,34 @@ def _check_servos(path: Path, file: RobotFile) -> None:
     if len(set(numbers)) != len(numbers):
         twice = sorted({number for number in numbers if numbers.count(number) > 1})
         raise DescriptionError(f"{path}: servo_id given twice: {', '.join(map(str, twice))}")
+    if file.bus is not None:
+        _check_models(path, file)
     for joint in file.joints:
         ends = sorted(joint.zero_counts + joint.counts_per_deg * end for end in (joint.lower_deg, joint.upper_deg))
         if joint.servo_id is not None and not (ends[0] >= 0 and ends[1] <= POSITION_MODE_MAXIMUM):
             raise DescriptionError(
                 f"{path}: joint {joint.name}: expected a range within 0 to {POSITION_MODE_MAXIMUM} counts, what a "
                 f"servo's position mode takes, found {ends[0]:.0f} to {ends[1]:.0f}"
+            )
+
+
+def _check_models(path: Path, file: RobotFile) -> None:
+    """Of the motors, which are named as the servos' models."""
+    from paramove.robots.dynamixel.bus.servo_models import CURRENT_UNIT_MA, MODELS  # needs the SDK
+
+    gripper = None if file.chain is None else file.chain.gripper
+    current = None if gripper is None else gripper.grip_current_ma
+    for joint in file.joints:
+        if joint.motor not in MODELS:
+            raise DescriptionError(
+                f"{path}: joint {joint.name} has motor {joint.motor!r}, which is no model of a servo; "
+                f"{nearest(joint.motor, MODELS)}; known are {', '.join(MODELS)}"
+            )
+        is_gripper = gripper is not None and gripper.joint == joint.name
+        if is_gripper and current is not None and joint.motor not in CURRENT_UNIT_MA:
+            raise DescriptionError(
+                f"{path}: the chain's gripper has grip_current_ma, but {joint.motor}, the motor of {joint.name}, "
+                f"controls no current; leave it out, or use one of {', '.join(CURRENT_UNIT_MA)}"
             )
 
 

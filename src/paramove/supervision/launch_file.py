@@ -61,6 +61,7 @@ def load(
     settings: Sequence[str] = (),
     seed: int | None = None,
     headless: bool = False,
+    robot: str | None = None,
 ) -> Launch:
     """Reads `launch/<name>.yaml` with its overlays and settings and checks the result.
 
@@ -72,13 +73,14 @@ def load(
         settings: Each `node.parameter=value`; the value is YAML.
         seed: Written into each of the file's `seed_parameters`.
         headless: Sets the parameters that the file names under `headless`, before `settings`.
+        robot: Written into the parameter `robot` of each node for which the files give one, before `settings`.
 
     Raises LaunchFileMissingError, or DocumentError with all that is wrong.
     """
     path = _typed(workspace, (_FOLDER,), name, "launch file")
     document, chosen = _with_overlays(workspace, path.stem, _read(path), overlays)
     given = [topics.present_names(setting) for setting in settings]
-    document, findings = with_values(document, given, seed, headless, overlays is not None)
+    document, findings = with_values(document, given, seed, headless, overlays is not None, robot)
     try:
         file = validated(document)
     except DocumentError as error:

@@ -11,9 +11,14 @@ Findings = list[DocumentError]
 
 
 def with_values(
-    document: Document, settings: Sequence[str], seed: int | None, headless: bool, named: bool = True
+    document: Document,
+    settings: Sequence[str],
+    seed: int | None,
+    headless: bool,
+    named: bool = True,
+    robot: str | None = None,
 ) -> tuple[Document, Findings]:
-    """The document with the values that `--headless`, `--set` and `--seed` give, and the errors in these.
+    """The document with the values that `--headless`, `--robot`, `--set` and `--seed` give, and the errors in these.
 
     Args:
         document: Launch file with its overlays.
@@ -21,12 +26,19 @@ def with_values(
         seed: Written into each of the file's `seed_parameters`.
         headless: Sets the parameters that the file names under `headless`, before `settings`.
         named: Whether the overlays were named by `--with`.
+        robot: Written into the parameter `robot` of each node for which the files give one, before `settings`.
     """
     findings: Findings = []
     values: list[tuple[str, Any, Position]] = []
     if headless and isinstance(document.data.get("headless"), dict):
         for target, value in document.data["headless"].items():
             values.append((target, value, document.position(("headless", target))))
+    if robot is not None:
+        where = Position(f"--robot {robot}")
+        robots = [node for node in _nodes(document) if _value_at(document, node, ["robot"]) is not None]
+        if not robots:
+            findings.append(DocumentError(where, "no node of this launch file names a robot, so none can be replaced"))
+        values += [(f"{node}.robot", robot, where) for node in robots]
     for setting in settings:
         where = Position(f"--set {setting}")
         target, equals, text = setting.partition("=")
@@ -67,7 +79,7 @@ def _is_connection(document: Document, target: str) -> bool:
 
 
 def _value_at(document: Document, node: str, parameters: Sequence[str]) -> Any:
-    value: Any = _nodes(document)[node]
+    value: Any = _nodes(document)[node]  # anything, in a file with errors
     for key in ("parameters", *parameters):
         value = value.get(key) if isinstance(value, dict) else None
     return value
