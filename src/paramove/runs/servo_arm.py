@@ -149,7 +149,8 @@ def _draw(path: Path, results: Sequence[TaskResult], states: Sequence[TruthState
         ax.set_xlabel(f"{'xyz'[across]}, m")
         ax.set_ylabel(f"{'xyz'[up]}, m")
         ax.set_title(title)
-        ax.set_aspect("equal")
+        ax.set_aspect("equal", adjustable="datalim")  # narrow motions fill the axes too
+        ax.margins(0.1)
         ax.locator_params(nbins=5)
     axes[0].invert_xaxis()  # y grows to the left
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
