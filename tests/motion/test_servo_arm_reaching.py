@@ -220,7 +220,7 @@ def test_a_target_out_of_reach_is_refused_with_a_place_that_can_be_reached(name:
 
 @each_arm
 def test_below_the_table_nothing_is_reached(name: str) -> None:
-    with pytest.raises(OutOfReachError, match="the hand would touch the table or the arm itself") as rejection:
+    with pytest.raises(OutOfReachError, match=r"the arm would touch the table|its .* would touch its") as rejection:
         pick_and_place(name, (0.15, 0.0, 0.002), (0.15, 0.05, GRASP_Z))
     assert rejection.value.position is not None
     assert rejection.value.position[2] > 0.005

@@ -10,6 +10,15 @@ import pytest
 from paramove.robots.description import RobotDescription
 
 KOCH = Path("robot_description/koch_v1_1")
+MAST = """<body name="mast" pos="-0.1 0.1 0.05">
+  <inertial pos="0 0 0" mass="0.05" diaginertia="1e-4 1e-4 1e-4"/>
+  <joint name="camera_tilt" axis="0 1 0" range="-1 1"/>
+</body>"""
+JOINT = (
+    "  - {name: camera_tilt, servo_id: 9, motor: xl330_m288, lower_deg: -50, upper_deg: 50, "
+    "counts_per_deg: 11.3777778, zero_counts: 2048, base_deg: 10}\n"
+)
+"""Not of the arm: it stays in its base pose."""
 LONGER = {
     "koch_v1_1.xml": {
         'pos="0.0073 0 0.1083"': 'pos="0.0073 0 0.1333"',  # the elbow's servo
@@ -20,8 +29,10 @@ LONGER = {
         'pos="0.093 0 0.0027"': 'pos="0.111 0 0.0027"',  # the wrist's servo
         'name="wrist" pos="0.10048 0 0.0027"': 'name="wrist" pos="0.11848 0 0.0027"',
         'mass="0.050177"': 'mass="0.060"',
+        "</worldbody>": f"{MAST}</worldbody>",
     },
     "robot.yaml": {
+        "motors:\n": JOINT + "\nmotors:\n",
         "upper_arm: [0.0148, 0.1083]": "upper_arm: [0.0148, 0.1333]",
         "forearm: [0.10048, 0.0027]": "forearm: [0.11848, 0.0027]",
     },
@@ -30,7 +41,7 @@ NAMES = {"shoulder_pan": "turn", "elbow_flex": "bend", "koch_v1_1": "long_arm"}
 
 
 def described(folder: Path) -> Path:
-    """A Koch whose upper arm is 25 mm longer and whose forearm is 18 mm longer, with names of its own."""
+    """A Koch whose upper arm is 25 mm longer and whose forearm is 18 mm longer, with names and a joint of its own."""
     made = folder / "long_arm"
     made.mkdir()
     for file in ("koch_v1_1.xml", "scene.xml", "robot.yaml"):
@@ -48,7 +59,7 @@ def described(folder: Path) -> Path:
 def test_an_arm_that_is_a_folder_reaches_and_relocates(launcher, tmp_path):
     robot = described(tmp_path)
     joints = RobotDescription.load(robot).joint_names
-    assert {"turn", "bend"} < set(joints)
+    assert {"turn", "bend", "camera_tilt"} < set(joints)
     tasks = "reacher.tasks=[{reach: [0.22, 0.06, 0.11]}, {pick: [0.16, 0.0, 0.012], place: [0.21, 0.03, 0.012]}]"
     options = ["--with", "emulated", "--headless", "--robot", str(robot), "--set", tasks]
     code, shown = launcher.run("dynamixel_arm", *options)

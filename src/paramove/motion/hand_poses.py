@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -45,10 +47,13 @@ class HandPoses:
                 f"{goal.tolist()} is no position: expected three numbers x, y, z in m, up to {FARTHEST_M:g} m away"
             )
         pitches, angles = self._poses(goal, preferred, band)
+        obstacles = []
         for pitch, row in zip(pitches, angles, strict=True):
-            if self._clear(row):
+            obstacle = self._obstacle(row)
+            if not obstacle:
                 return float(pitch)
-        raise self._out_of_reach(goal, preferred, band, len(pitches) > 0)
+            obstacles.append(obstacle)
+        raise self._out_of_reach(goal, preferred, band, obstacles)
 
     def middle(self, height: float, band: tuple[float, float]) -> Floats:
         """Mean of the positions straight ahead at this height that are reached with a pitch of a band, [3], m."""
@@ -67,15 +72,19 @@ class HandPoses:
         reached = good.any(axis=-1)
         return pitches[reached], solutions[np.arange(len(pitches)), first][reached]
 
-    def _clear(self, row: Floats) -> bool:
+    def _obstacle(self, row: Floats) -> str:
+        """What the arm would touch in a pose; empty if nothing."""
         pose = np.append(row, self._gripper)[None]
-        return float(self._clearance.heights(pose)[0]) >= MIN_HEIGHT and self._clearance.touching(pose) is None
+        if float(self._clearance.heights(pose)[0]) < MIN_HEIGHT:
+            return "the arm would touch the table there"
+        touching = self._clearance.touching(pose)
+        return "" if touching is None else f"its {touching[0]} would touch its {touching[1]} there"
 
     def _out_of_reach(
-        self, goal: Floats, preferred: float, band: tuple[float, float], reached: bool
+        self, goal: Floats, preferred: float, band: tuple[float, float], obstacles: Sequence[str]
     ) -> OutOfReachError:
         lowest, highest = np.rad2deg(band)
-        cause = "the hand would touch the table or the arm itself there" if reached else self._cause(goal, preferred)
+        cause = " or ".join(dict.fromkeys(obstacles)) or self._cause(goal, preferred)
         message = f"{metres(goal)} cannot be reached with the hand {lowest:.0f} to {highest:.0f} deg down: {cause}"
         nearest = self._nearest(goal, preferred, band)
         if nearest is None:
@@ -104,7 +113,7 @@ class HandPoses:
             solutions = self._chain.kinematics.all_joint_angles(positions[:, None], pitches[None])
             reached = positions[np.isfinite(solutions).all(axis=-1).any(axis=-1).any(axis=-1)]
             for position in reached[np.argsort(np.linalg.norm(reached - goal, axis=-1))][:_TRIED_POSITIONS]:
-                if any(self._clear(row) for row in self._poses(position, preferred, band)[1]):
+                if any(not self._obstacle(row) for row in self._poses(position, preferred, band)[1]):
                     return np.asarray(position)
         return None
 
