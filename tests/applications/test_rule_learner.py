@@ -268,6 +268,20 @@ def test_help_is_asked_for_where_each_stands_in_the_way_of_the_other() -> None:
     assert story.requests().count("HELP") == 1
 
 
+def test_where_moving_an_object_did_not_help_the_one_in_its_way_is_moved() -> None:
+    story = Story()
+    near = [(REJECTED, "too near to standing_1", None), (REJECTED, "too near to standing_0", None)]
+    story.outcomes = near * 3
+    story.in_the_way = [[1], [0]] * 3
+    assert story.run(400.0), story.learner.detail
+    asked = [speech for speech in story.speech if speech.request == Speech.REQUEST_HELP]
+    assert [speech.object for speech in asked[:2]] == ["blue", "yellow"]
+    assert "Please put it to another place" in asked[0].text
+    assert "I cannot reach blue" in asked[1].text
+    assert "Please put yellow to another place" in asked[1].text
+    assert len(asked) == 3
+
+
 def test_help_is_asked_for_again_when_nobody_comes() -> None:
     story = Story()
     story.outcomes = [(REJECTED, "no way", None)]

@@ -35,6 +35,8 @@ class Applying(Stage):
         self._failure = ""
         self._avoided: tuple[str, ...] = ()
         self._stuck: set[str] = set()
+        self._moved: set[str] = set()
+        self._to_move = ""
 
     def enter(self) -> None:
         """Ask the instructor to point."""
@@ -131,16 +133,23 @@ class Applying(Stage):
             self.go("looking")
 
     def _rejected(self, outcome: RelocationStatus) -> None:
-        """No path around a standing object: that one first. Ask for help only if each blocks the other."""
+        """No path around a standing object: that one first. Ask for help only if each blocks the other.
+
+        A person who moves the same object each time may never resolve that: the next time, one in its way is moved.
+        """
         self._stuck.add(self._object)
-        in_the_way = (self._avoided[number] for number in outcome.in_the_way if number < len(self._avoided))
+        in_the_way = [self._avoided[number] for number in outcome.in_the_way if number < len(self._avoided)]
         other = next((name for name in in_the_way if name not in self._stuck | self.app.done), "")
         if other:
             detail = f"{other} stands in the way of {self._object}. Please point at {other} first."
             self.app.speak(detail, Speech.REQUEST_POINT_AT_OBJECT, other)
             self.go("waiting")
         else:
-            self._ask_for_help(f"I cannot reach {self._object} at {cm(self._source)}: {outcome.reason}.")
+            to_move = next((name for name in (self._object, *in_the_way) if name not in self._moved), "")
+            if not to_move:  # all were moved once
+                self._moved.clear()
+            detail = f"I cannot reach {self._object} at {cm(self._source)}: {outcome.reason}."
+            self._ask_for_help(detail, to_move or self._object)
 
     def _returning(self) -> None:
         """The arm may have been left anywhere: bring it to its base pose before looking."""
@@ -173,22 +182,26 @@ class Applying(Stage):
         self.app.speak(f"{self._object} is at {cm(place)}{': ' + reason if reason else ''}. I try again.")
         self._relocate()
 
-    def _ask_for_help(self, detail: str) -> None:
-        self.app.speak(f"{detail} Please put it to another place.", Speech.REQUEST_HELP, self._object)
+    def _ask_for_help(self, detail: str, to_move: str = "") -> None:
+        self._to_move = to_move or self._object
+        self._moved.add(self._to_move)
+        what = "it" if self._to_move == self._object else self._to_move
+        self.app.speak(f"{detail} Please put {what} to another place.", Speech.REQUEST_HELP, self._to_move)
         self.go("helped")
 
     def _helped(self) -> None:
-        sighting = self.app.table.objects.get(self._object)
+        sighting = self.app.table.objects.get(self._to_move)
         came = sighting is not None and sighting.at_rest and sighting.time_s > self.app.now_s - self.for_s
         if came and self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S:
             self._stuck.clear()
             self._ask()
         elif self.for_s > self.app.options.ask_again_s:
-            self._ask_for_help(f"I still need help with {self._object}.")
+            self._ask_for_help(f"I still need help with {self._to_move}.", self._to_move)
 
     def _put_away(self) -> ApplicationStage.Stage | None:
         self.app.done.add(self._object)
         self._stuck.clear()
+        self._moved.clear()
         self.app.speak(f"{self._object} is put away.")
         if set(self.app.options.objects) <= self.app.done:
             self.app.speak("All objects are put away. Thank you!", Speech.REQUEST_THANK_YOU)
