@@ -13,7 +13,7 @@ Publishes   arm/joint_states        foxglove.JointStates   15 Hz   rad
 """
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
-from paramove.robots import ThisLaunch
+from paramove.robots import RobotFolder, ThisLaunch
 from paramove.robots.dynamixel import DrivenArm, ServoArmSetup
 
 SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS)
@@ -23,6 +23,8 @@ PUBLISHES = (*JOINTS, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY, topics.AR
 
 class Config(NodeConfig, ServoArmSetup):
     """See `ServoArmSetup`."""
+
+    robot: RobotFolder
 
 
 def run(bus: Bus, config: Config) -> None:

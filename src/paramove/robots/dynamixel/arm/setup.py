@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import ConfigDict, Field
 
 from paramove.documents import OldNames
-from paramove.robots import DescriptionError, RobotDescription, RobotFolder, ThisLaunch
+from paramove.robots import DescriptionError, RobotDescription, ThisLaunch
 from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
 from paramove.robots.dynamixel.arm.servo_arm import Timeouts
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
@@ -63,7 +63,7 @@ class ServoArmSetup(OldNames):
 
     old_names = (("patience", "timeouts"),)
 
-    robot: RobotFolder
+    robot: Path
     port: Path
     torque_off: bool = False
     timeouts: Timeouts = Timeouts()
