@@ -11,8 +11,7 @@ import mujoco
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from paramove.bus import topics
-from paramove.bus.topics import Topic
+from paramove.bus import Topic, topics
 from paramove.cameras import CalibratedCamera
 from paramove.documents import Floats
 from sim.camera import Eye, raw_image, with_noise

@@ -12,8 +12,7 @@ import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from numpy.typing import NDArray
 
-from paramove.bus import topics
-from paramove.bus.topics import Topic
+from paramove.bus import Topic, topics
 from paramove.diagnosis import graphics_backend
 from paramove.documents import Image
 from sim import looks, scene

@@ -10,8 +10,7 @@ import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from ruamel.yaml import YAML
 
-from paramove.bus import Received, topics
-from paramove.bus.topics import Topic
+from paramove.bus import Received, Topic, topics
 from paramove.cameras import write_cameras
 from paramove.demonstrations import table_place
 from paramove.msgs.truth_pb2 import TruthArm

@@ -10,8 +10,7 @@ from typing import Any, Protocol
 
 import mujoco
 
-from paramove.bus import Received, topics
-from paramove.bus.topics import Topic
+from paramove.bus import Received, Topic, topics
 from paramove.documents import Floats
 from paramove.msgs.truth_pb2 import TruthLayout
 from sim import truth

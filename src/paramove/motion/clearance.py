@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from paramove.documents import Floats, Ints
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.model_check import check_model
-from paramove.robots import RobotDescription
+from paramove.robots import DescriptionError, RobotDescription
 
 MAX_STANDING = 8
 FAR_M = 0.05
@@ -75,7 +75,10 @@ class ClearanceChecker:
         self, robot: RobotDescription, arm: GripperArm, surface: WorkSurface, cylinder: UprightCylinder
     ) -> None:
         self.surface, self.cylinder = surface, cylinder
-        self._model = model = _compiled(robot, surface, cylinder)
+        try:
+            self._model = model = _compiled(robot, surface, cylinder)
+        except ValueError as error:  # of MuJoCo
+            raise DescriptionError(f"{robot.model_path} does not fit the robot's description: {error}") from error
         check_model(robot, arm, model)
         self._data = data = mujoco.MjData(model)
         data.qpos[[int(model.joint(name).qposadr[0]) for name in robot.joint_names]] = robot.base_pose

@@ -208,15 +208,19 @@ class RobotDescription:
         return _assemble(path, read_robot_file(path))
 
 
-def _described(path: Path) -> Path:
-    try:
-        RobotDescription.load(path)
-    except DescriptionError as error:
-        raise ValueError(str(error)) from error
-    return path
+@dataclass(frozen=True)
+class _Described:
+    """Checks that a path names a description."""
+
+    def __call__(self, path: Path) -> Path:
+        try:
+            RobotDescription.load(path)
+        except DescriptionError as error:
+            raise ValueError(str(error)) from error
+        return path
 
 
-RobotFolder = Annotated[Path, AfterValidator(_described)]
+RobotFolder = Annotated[Path, AfterValidator(_Described())]
 """Parameter of a node: what `RobotDescription.load` takes, and accepts."""
 
 

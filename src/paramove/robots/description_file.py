@@ -264,7 +264,7 @@ def _check_servos(path: Path, file: RobotFile) -> None:
 
 def _check_models(path: Path, file: RobotFile) -> None:
     """Of the motors, which are named as the servos' models."""
-    from paramove.robots.dynamixel.bus.servo_models import CURRENT_UNIT_MA, MODELS  # needs the SDK
+    from paramove.robots.dynamixel import CURRENT_UNIT_MA, MODELS  # needs the SDK
 
     gripper = None if file.chain is None else file.chain.gripper
     current = None if gripper is None else gripper.grip_current_ma
