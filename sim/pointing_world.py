@@ -18,8 +18,8 @@ from sim.camera import raw_image, with_noise
 from sim.performances import Studio
 from sim.persons.performances import Performance, assembled, kind_named, pointed_once
 from sim.persons.performers import draw_performer
+from sim.simulation import CAMERA_HZ
 
-CAMERA_HZ = 15
 SEED_SPACE = 1000
 """Numbers of performances from here on are runs; those below are the clips of chapter 6."""
 REST_S = (1.0, 1.8)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dynamixel_emulator.errors import EmulatorError, suggestion
-from dynamixel_emulator.models import FIRST_INDIRECT, RAM_START, Register, ServoModel
+from dynamixel_emulator.models import FIRST_INDIRECT, RAM_START, Register, ServoModel, within
 from dynamixel_emulator.packets import StatusError
 
 MULTI_TURN = 1_048_575
@@ -183,8 +183,7 @@ class ServoMemory:
             bytes(written[byte_address] for byte_address in addresses), "little", signed=register.signed
         )
         assert register.allowed is not None
-        low, high = register.allowed
-        if (low is not None and value < low) or (high is not None and value > high):
+        if not within(value, register.allowed):
             raise RejectedError(StatusError.DATA_RANGE)
         if register.name == "Operating Mode" and value not in self.model.modes:
             raise RejectedError(StatusError.DATA_RANGE)
@@ -192,8 +191,7 @@ class ServoMemory:
             return register, value
         if register.name.startswith("Goal") and self["Bus Watchdog"] == TRIPPED:  # goals are read-only
             raise RejectedError(StatusError.DATA_RANGE)
-        low, high = self._limits(register.name)
-        if (low is not None and value < low) or (high is not None and value > high):
+        if not within(value, self._limits(register.name)):
             raise RejectedError(StatusError.DATA_LIMIT)
         return register, value
 

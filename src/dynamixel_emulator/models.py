@@ -24,6 +24,12 @@ ANY = (None, None)
 Range = tuple[int | None, int | None]
 
 
+def within(value: int, allowed: Range) -> bool:
+    """Whether a value is in a range."""
+    low, high = allowed
+    return (low is None or value >= low) and (high is None or value <= high)
+
+
 @dataclass(frozen=True)
 class Register:
     """One register of a control table.

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from dynamixel_emulator.memory import POSITION_MODE
-from dynamixel_emulator.models import PULSES_PER_TURN
+from dynamixel_emulator.models import PULSES_PER_TURN, within
 from dynamixel_emulator.servo import EmulatedServo
 
 HEADER = b"\xff\xff\xfd"
@@ -211,9 +211,9 @@ class ProtocolChecker:
         memory = servo.memory
         if servo.model.registers[name].address < LOCKED_BELOW and memory["Torque Enable"]:
             self._report("eeprom", f"{name} was written while torque is on", servo.id)
-        low, high = servo.model.registers[name].allowed or (None, None)
-        if (low is not None and value < low) or (high is not None and value > high):
-            self._report("range", f"{name} {value} is outside of {low} to {high}", servo.id)
+        allowed = servo.model.registers[name].allowed
+        if allowed is not None and not within(value, allowed):
+            self._report("range", f"{name} {value} is outside of {allowed[0]} to {allowed[1]}", servo.id)
         if name == "Torque Enable":
             self._check_torque(servo, value)
         limits = {

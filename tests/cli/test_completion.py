@@ -58,6 +58,8 @@ def offered(monkeypatch, capsys):
         ("paramove launch rule_learning --set camera.w", {"camera.width="}),
         ("paramove launch rule_learning --set simulator.se", {"simulator.seed="}),
         ("paramove launch rule_learning --with real --set simulator.", set()),
+        ("paramove launch --robot k", {"koch_v1_1"}),
+        ("paramove launch --robot koch_v1_1 rule_learning --set camera.w", {"camera.width="}),
         ("paramove launch --schema ", {"launch", "overlay"}),
         ("paramove topic ec", {"echo"}),
         ("paramove topic echo camera/im", {"camera/image", "camera/image_raw"}),

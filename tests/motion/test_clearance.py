@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from paramove.motion.clearance import (
+    FAR_M,
     GRASPED_ABOVE_MIDDLE,
     MAX_STANDING,
     ClearanceChecker,
@@ -128,6 +129,11 @@ def test_a_lower_table_is_further_away() -> None:
     angles = over_the_surface(0.035)
     gained = other.smallest(angles, [], [False]).distance - checker().smallest(angles, [], [False]).distance
     np.testing.assert_allclose(gained, 0.007, rtol=0, atol=1e-5)
+
+
+def test_where_nothing_stands_nothing_is_near() -> None:
+    found = checker().to_standing(over_the_surface(0.09), [], [True])
+    assert (found.distance, found.standing) == (FAR_M, None)
 
 
 def test_more_objects_than_it_was_made_for_are_refused() -> None:

@@ -8,6 +8,7 @@ import cv2
 import mujoco
 import numpy as np
 
+from sim.camera import with_noise
 from sim.human import place_arm
 from sim.pointing_world import PointingWorld
 
@@ -64,14 +65,12 @@ class Room:
     def noisy(self, film: list[list[Image]]) -> list[list[Image]]:
         """With the noise of the sensor, which no two images share; the same for a film whatever was asked before."""
         draw = np.random.default_rng(self._seed)
-        return [[self._exposed(image, draw) for image in view] for view in film]
+        return [
+            [with_noise(np.ascontiguousarray(image), self.studio.room.noise, draw) for image in view] for view in film
+        ]
 
     def close(self) -> None:
         self._world.close()
-
-    def _exposed(self, image: Image, draw: np.random.Generator) -> Image:
-        noise = draw.normal(0.0, self.studio.room.noise, image.shape).round().astype(np.int8)
-        return np.ascontiguousarray(cv2.add(np.ascontiguousarray(image), noise, dtype=cv2.CV_8U))
 
 
 def second_person(film: list[list[Image]], empty: list[Image]) -> list[list[Image]]:

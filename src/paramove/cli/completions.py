@@ -14,7 +14,7 @@ from pathlib import Path
 
 from paramove.workspace import Workspace
 
-_WITH_VALUE = ("--set", "--seed", "--runs")
+_WITH_VALUE = ("--set", "--seed", "--runs", "--robot")
 
 
 def launch_files(incomplete: str) -> list[str]:

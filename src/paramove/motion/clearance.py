@@ -147,7 +147,7 @@ class ClearanceChecker:
         return None
 
     def _closest(self, angles: ArrayLike, pairs: Ints, upright: list[int], holding: ArrayLike, every: int) -> Clearance:
-        q = np.asarray(angles, dtype=np.float64)
+        q, pairs = np.asarray(angles, dtype=np.float64), np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
         held = np.broadcast_to(np.asarray(holding, dtype=bool), len(q))
         held_too = np.concatenate([pairs, [[self._held, other] for other in upright]]) if upright else pairs
         worst = Clearance(FAR_M, 0, ("", ""))

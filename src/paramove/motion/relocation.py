@@ -17,7 +17,7 @@ from paramove.motion.arm_pose import ArmPoseSolver
 from paramove.motion.planned_motion import Path, PlannedMotion, RelocationOptions
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.motion.timing import fade_in, largest_excess, minimum_jerk, resampled, slowed_times, soft_ends
-from paramove.robots import AboveTablePart, Arm, DescriptionError
+from paramove.robots import AboveTable, Arm, DescriptionError
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SLOWING_ROUNDS = 6
@@ -191,7 +191,7 @@ class RelocationPlanner:
         path.add(name, poses, np.clip(values[:, 9], 0.0, 1.0), np.clip(values[:, 10], 0.0, 1.0))
 
     @property
-    def _above_table(self) -> AboveTablePart:
+    def _above_table(self) -> AboveTable:
         assert self.arm.above_table is not None  # checked when the planner is made
         return self.arm.above_table
 
@@ -199,7 +199,7 @@ class RelocationPlanner:
         """From the base pose to where the movement begins, or back: no movement of people, who sit at the table."""
         o = self.options
         first = self.solver.solve(begin.elbow, self._outward(begin.gripper), begin.finger_to_thumb).angles[0]
-        corners = np.concatenate([self.base_angles[None, :5], np.deg2rad(self._above_table.via_deg), first[None]])
+        corners = np.concatenate([self.base_angles[None, :5], self._above_table.via, first[None]])
         at = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(corners, axis=0)).max(axis=1))])
         n = max(2, round(o.raise_duration / path.period))
         along = minimum_jerk((np.arange(n, 0, -1) - 1 if backwards else np.arange(1, n + 1)) / n)
@@ -269,7 +269,7 @@ class RelocationPlanner:
         o = self.options
         if not self.movement.begins_above_table:
             return self._blended(states, self._base, o.blend_share)
-        gripper = np.clip(states.gripper[:1], *np.transpose(self._above_table.begin_within))
+        gripper = np.clip(states.gripper[:1], self._above_table.lowest, self._above_table.highest)
         return self._blended(states, ArmPoses(states.elbow[:1], gripper, states.finger_to_thumb[:1]), 1.0)
 
     def _blended(self, states: ArmPoses, first: ArmPoses, fraction: float) -> ArmPoses:

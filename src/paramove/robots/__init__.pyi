@@ -1,10 +1,10 @@
 from .arm_kinematics import ArmKinematics as ArmKinematics
+from .description import AboveTable as AboveTable
 from .description import Arm as Arm
 from .description import Chain as Chain
 from .description import DescriptionError as DescriptionError
 from .description import RobotDescription as RobotDescription
 from .description import RobotFolder as RobotFolder
-from .description_file import AboveTablePart as AboveTablePart
 from .joint_units import INT16_RANGE as INT16_RANGE
 from .joint_units import JointRangeError as JointRangeError
 from .joint_units import JointUnits as JointUnits

@@ -39,6 +39,20 @@ __all__ = ["Arm", "Chain", "DescriptionError", "RobotDescription"]
 
 
 @dataclass(frozen=True, eq=False)
+class AboveTable:
+    """How an arm begins movements that begin above a table.
+
+    Attributes:
+        lowest, highest: Corners of the box in which one may begin, [3], m, frame of the shoulder.
+        via: Angles of the arm's joints on the path from the base pose to there, [N, 5], rad.
+    """
+
+    lowest: Floats
+    highest: Floats
+    via: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Arm:
     """One arm of a robot.
 
@@ -49,7 +63,7 @@ class Arm:
         fingers_open, fingers_closed: Angles of the open (xi = 1) and the closed hand (xi = 0), rad.
         felt_opening, holding_openings: How a held object is detected: see `FingersPart`.
         kinematics: Forward kinematics in the frame of the shoulder site.
-        above_table: How it begins movements that begin above a table; None: it cannot.
+        above_table: None: it cannot begin movements above a table.
     """
 
     joints: tuple[str, ...]
@@ -62,7 +76,7 @@ class Arm:
     holding_openings: tuple[float, float]
     sites: ArmSites
     kinematics: ArmKinematics
-    above_table: AboveTablePart | None = None
+    above_table: AboveTable | None = None
 
     def fingers_angle(self, xi: float) -> float:
         """Angle of the finger joint for the opening `xi` in 0 (closed) to 1 (open), rad."""
@@ -280,8 +294,15 @@ def _arm(names: tuple[str, ...], arm: ArmPart) -> Arm:
         holding_openings=arm.fingers.holding_openings,
         sites=arm.sites,
         kinematics=ArmKinematics(arm.upper_arm, arm.gripper_from_elbow, arm.fingertip_from_elbow),
-        above_table=arm.above_table,
+        above_table=None if arm.above_table is None else _above_table(arm.above_table),
     )
+
+
+def _above_table(part: AboveTablePart) -> AboveTable:
+    lowest, highest = (_frozen(ends) for ends in zip(*part.begin_within, strict=True))
+    via = np.deg2rad(part.via_deg)
+    via.flags.writeable = False
+    return AboveTable(lowest, highest, via)
 
 
 def _chain(names: tuple[str, ...], chain: ChainPart, lower: Floats, upper: Floats) -> Chain:

@@ -79,7 +79,7 @@ def _is_connection(document: Document, target: str) -> bool:
 
 
 def _value_at(document: Document, node: str, parameters: Sequence[str]) -> Any:
-    value: Any = _nodes(document)[node]  # anything, in a file with errors
+    value: Any = _nodes(document)[node]
     for key in ("parameters", *parameters):
         value = value.get(key) if isinstance(value, dict) else None
     return value
