@@ -77,6 +77,7 @@ class RawPublisher:
         self.sequence = 0
         self.socket: zmq.Socket[Any] = context.socket(zmq.XPUB)
         self.socket.setsockopt(zmq.XPUB_VERBOSE, 1)
+        self.socket.setsockopt(zmq.SNDHWM, 0)  # drops nothing where the machine is busy
         self.socket.bind(f"ipc://{socket_path(folder, topic.name)}")
 
     def frames(self, payload: bytes, published_ns: int = 0, **changed: Any) -> list[bytes]:
