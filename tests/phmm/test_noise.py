@@ -28,7 +28,7 @@ from paramove.phmm.noise import (
     moving_average,
     noise_variance,
 )
-from paramove.phmm.performance import Pace, noisy_pace, pace_features, part_averages, state_averages
+from paramove.phmm.performance import Pace, movement_parts, noisy_pace, pace_features
 from tests.phmm.movements import shown, trained, wave
 
 NOISE = 0.06
@@ -85,16 +85,12 @@ def test_only_what_is_clearly_more_than_in_training_counts() -> None:
 def test_covariance_of_averages_is_that_of_drawn_noise(n_frames: int | None) -> None:
     """Interpolation to other numbers of frames lowers the noise of a frame and makes neighbours alike."""
     rng = np.random.default_rng(0)
-    gamma = expected_responsibilities(np.tile([0.0, 0.0, 0.5, 0.5], (8, 1)), n_frames or 60)
     noise = AddedNoise(0.25, np.zeros((60, 2)), n_frames)
-
-    def averaged(frames: np.ndarray) -> np.ndarray:
-        return part_averages(*state_averages(gamma, frames), frames, 5)
 
     drawn = 0.5 * rng.standard_normal((4000, 60, 2))
     seen = drawn if n_frames is None else np.stack([resample(one, n_frames) for one in drawn])
-    found = np.cov(np.stack([averaged(one) for one in seen]).T)
-    expected = noise.of_averages(averaged)
+    found = np.cov(np.stack([movement_parts(one) for one in seen]).T)
+    expected = noise.of_averages(movement_parts)
     assert_allclose(found, expected, rtol=0.0, atol=0.08 * np.diagonal(expected).max())
     assert_allclose(np.diagonal(found), np.diagonal(expected), rtol=0.12)
     assert_allclose(noise.of_frames, seen.var(), rtol=0.03)

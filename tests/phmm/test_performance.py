@@ -9,9 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from paramove.phmm import LinearPHMM, ParametricHMM, QuadraticPHMM
-from paramove.phmm.performance import pace_features, part_averages, part_begins, state_averages
-from paramove.phmm.search_kernels import responsibilities_at
+from paramove.phmm.performance import movement_parts, pace_features
 from tests.phmm.movements import shown, trained, untrained, wave
+from tests.phmm.table import table_movements
 
 
 def test_distances_of_parts_and_of_pace_belong_to_the_same_movement() -> None:
@@ -77,15 +77,47 @@ def test_pace_is_a_logarithm_of_ways() -> None:
     assert_allclose(pace_features(straight), np.log(0.2 * np.sqrt(1.0 / 3.0) * 1.02), rtol=1e-9)
 
 
-def test_parts_of_a_movement_that_is_asked_about_are_those_of_the_training() -> None:
-    """Training averages in numpy, for several numbers of parts at once; the search for theta does it compiled."""
-    sequences, theta = shown(0)
-    model = untrained(QuadraticPHMM).fit(sequences, theta)
-    regression = model.performances_.complete
-    n_parts = model.performances_.n_parts(3)
-    x = model._checked(sequences[5])
-    movement = model._prepared(x)
-    gamma = responsibilities_at(model.monomials_.starts[0], movement)
-    expected = part_averages(*state_averages(gamma, x), x, n_parts)
-    found = regression.aligned_parts(x, movement, part_begins(model.n_states, n_parts), 1, 1.0)
-    assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
+def test_parts_are_means_of_fifths_and_the_last_frame() -> None:
+    x = np.column_stack([np.linspace(0.0, 1.0, 101), np.linspace(2.0, 0.0, 101) ** 2])
+    found = movement_parts(x).reshape(6, 2)
+    assert_allclose(found[:, 0], [0.1, 0.3, 0.5, 0.7, 0.9, 1.0], rtol=0.0, atol=0.005)
+    assert_allclose(found[-1], x[-1], rtol=1e-12)
+    assert_allclose(movement_parts(x[:2]).reshape(6, 2)[-1], x[1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("reach", [0.0, 0.15])
+def test_regions_of_tidy_movements_hold_theta(reach: float) -> None:
+    """Scripted movements vary by a sensor's noise alone, or also by where they begin and end."""
+    inside, errors = [], []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+
+        def tidy(theta: np.ndarray, rng: np.random.Generator = rng) -> np.ndarray:
+            s = np.linspace(0.0, 1.0, 40)[:, None] ** 2 * (3.0 - 2.0 * np.linspace(0.0, 1.0, 40)[:, None])
+            begin, end = reach * rng.standard_normal((2, 3)) / 10.0
+            return begin + s * (np.array([*theta, 0.1]) + end - begin) + 0.001 * rng.standard_normal((40, 3))
+
+        theta = np.repeat([[u, v] for u in (0.0, 0.4, 0.8) for v in (0.0, 0.15, 0.3)], 4, axis=0)
+        model = untrained(QuadraticPHMM).fit([tidy(one) for one in theta], theta)
+        for place in rng.uniform([0.0, 0.0], [0.8, 0.3], (60, 2)):
+            found = model.estimate(tidy(place))
+            missed = found.theta - place
+            inside.append(missed @ np.linalg.solve(found.covariance, missed) < np.array([1.386, 3.219, 5.991]))
+            errors.append(float(np.linalg.norm(missed)))
+    covered = np.mean(inside, axis=0)
+    assert_allclose(covered[:2], [0.5, 0.8], rtol=0.0, atol=0.12)
+    assert covered[2] >= 0.88
+    assert np.mean(errors) < (0.0004 if reach == 0.0 else 0.025)
+
+
+def test_p_values_of_new_movements_are_about_uniform() -> None:
+    """Of unseen targets over the table, from nine with five repetitions each."""
+    found: list[float] = []
+    for seed in range(3):
+        model = QuadraticPHMM(20, 4, 6).fit(*table_movements(3, 3, 5, seed=seed))
+        found += [model.examine(one).p_value for one in table_movements(5, 4, 3, seed=100 + seed)[0]]
+    below = [float(np.mean(np.array(found) < level)) for level in (0.01, 0.05, 0.2, 0.5)]
+    assert below[0] <= 0.03
+    assert 0.02 <= below[1] <= 0.1
+    assert 0.1 <= below[2] <= 0.3
+    assert 0.3 <= below[3] <= 0.7

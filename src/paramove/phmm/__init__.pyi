@@ -2,6 +2,7 @@ from .classification import INDEX_FILE as INDEX_FILE
 from .classification import Classification as Classification
 from .classification import MovementClassifier as MovementClassifier
 from .description import MovementDescription as MovementDescription
+from .examining import Examination as Examination
 from .grid import ParameterGrid as ParameterGrid
 from .interpolative import InterpolativePHMM as InterpolativePHMM
 from .model_cache import cached_model as cached_model
@@ -11,7 +12,6 @@ from .parametric import ParameterEstimate as ParameterEstimate
 from .parametric import ParametricHMM as ParametricHMM
 from .performance import groups_of as groups_of
 from .polynomial import CubicPHMM as CubicPHMM
-from .polynomial import Examination as Examination
 from .polynomial import LinearPHMM as LinearPHMM
 from .polynomial import PolynomialPHMM as PolynomialPHMM
 from .polynomial import QuadraticPHMM as QuadraticPHMM

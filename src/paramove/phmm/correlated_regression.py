@@ -1,10 +1,13 @@
-"""Polynomial regression of whole movements on theta, whose residuals are correlated in time and between points.
+"""Regression of whole movements on theta, whose residuals are correlated in time and between points.
 
 The likelihood of an HMM assumes independent frames: it is overconfident about theta, and does not model that a hand
-that starts too high usually ends too high. Here a movement is one vector y (all state averages), with
-y = Z phi(theta) + e, e ~ N(0, C). All choices are made by cross-validation over groups of training movements
-(all those of one person, or of one theta): the regularisation of each degree of the polynomial, the shrinkage of the
-correlations, and the inflation of regions of theta that gives them their nominal coverage.
+that starts too high usually ends too high. Here a movement is one vector y, with y = Z phi(theta) + e, e ~ N(0, C).
+C follows from studentised residuals: (I - H)^-1/2 r of each group has the covariance of e, whatever the fit took from
+it; where groups are persons, from (I - H)^-1 r, what the others' movements miss of a person's. The coefficients are
+uncertain too: an unseen movement varies by (1 + phi' V phi) C, with V the inverse of the regularised moments of phi, so
+a theta far from those shown has a wide region. All choices are made by cross-validation over groups of training
+movements (all those of one person, or of one theta): the regularisation of each degree of the polynomial, the shrinkage
+of the correlations, and the inflation of regions of theta that gives them their nominal coverage.
 """
 
 from __future__ import annotations
@@ -18,17 +21,17 @@ from scipy.linalg import solve_triangular
 
 from paramove.documents import Floats, Ints
 from paramove.phmm.features import Monomials
-from paramove.phmm.left_out import folds_of, inflation_of
+from paramove.phmm.left_out import folds_of, inflation_of, one_theta_each
 from paramove.phmm.noise import distances_with_noise
 from paramove.phmm.predictive_distribution import PredictiveDistribution
-from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out
-from paramove.phmm.search_kernels import Movement, aligned_parts, nearest
+from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out, studentised_residuals
+from paramove.phmm.search_kernels import nearest
 
-SHRINKAGES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
+SHRINKAGES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
 """Candidates for the fraction of each variance that counts as independent."""
-MIN_RELATIVE_DEVIATION = 0.02
-"""Minimum standard deviation as a fraction of the mean one: smaller ones are not known accurately."""
 NEWTON_STEPS = 12
+MARGIN = 1.0
+"""How far outside the bounds of the training theta of left-out movements may lie, as a fraction of their width."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,7 @@ class CorrelatedRegression:
     Attributes:
         monomials: of theta.
         coefficients: Z, shape (n, F).
+        uncertainty: V, covariance of the coefficients in units of C, shape (F, F).
         root: lower triangular L with C = L L', shape (n, n).
         inflation: factor on covariances of theta that gives regions their nominal coverage.
         distances: squared Mahalanobis distances of training movements, each left out, in their order. Shape (K,).
@@ -47,6 +51,7 @@ class CorrelatedRegression:
 
     monomials: Monomials
     coefficients: Floats
+    uncertainty: Floats
     root: Floats
     inflation: float
     distances: Floats
@@ -65,52 +70,68 @@ class CorrelatedRegression:
         shrinkages: tuple[float, ...] = SHRINKAGES,
     ) -> CorrelatedRegression:
         """From movements (K, n), labels (K, P) and the number of the group of each (K,); a ridge may be given."""
-        return cls._fitted(y, theta, monomials, groups, ridge, shrinkages)[0]
+        return cls.fitted_with_error(y, theta, monomials, groups, ridge, shrinkages)[0]
 
     @classmethod
-    def best_fitted(
-        cls, descriptions: Iterable[Floats], theta: Floats, monomials: Monomials, groups: Ints
-    ) -> CorrelatedRegression:
-        """From the one of several descriptions of the same movements, (K, n) each, that predicts theta best.
-
-        For left-out groups; the first description if nothing can be left out.
-        """
-        candidates = [cls._fitted(y, theta, monomials, groups, None, SHRINKAGES) for y in descriptions]
-        return min(candidates, key=lambda one: one[1])[0]
-
-    @classmethod
-    def _fitted(
+    def fitted_with_error(
         cls,
         y: Floats,
         theta: Floats,
         monomials: Monomials,
         groups: Ints,
-        ridge: tuple[float, ...] | None,
-        shrinkages: tuple[float, ...],
+        ridge: tuple[float, ...] | None = None,
+        shrinkages: tuple[float, ...] = SHRINKAGES,
     ) -> tuple[CorrelatedRegression, float]:
-        """And the mean error of scaled theta of left-out movements, infinite if none could be left out."""
-        features, degrees = monomials.at(theta), monomials.degrees
-        ridge = ridge if ridge is not None else chosen_ridge(y, features, degrees, groups)
-        penalty = penalties(ridge, degrees, len(y))
-        solved = np.linalg.solve(features.T @ features + penalty, features.T @ y)
-        coefficients = np.ascontiguousarray(solved.T, dtype=np.float64)  # as after reading a file
-        left_out = residuals_left_out(y, features, penalty, groups)
-        deviation = deviations_of(left_out)
-        folds = _folds(y / deviation, theta, monomials, penalty, groups)
-        shrinkage, excess, tested, error = chosen_shrinkage(folds, shrinkages)
-        inflation = inflation_of(excess, theta.shape[1], len(np.unique(groups)), minimum=1e-6)
-        triangle = np.linalg.cholesky(shrunk(left_out / deviation, shrinkage))
+        """And the mean error of scaled theta of left-out groups, infinite if no group could be left out."""
+        units = _left_out_units(theta, monomials, groups)
+        features, one_each = monomials.at(theta), one_theta_each(theta, groups)
+        ridge = ridge if ridge is not None else chosen_ridge(y, features, monomials.degrees, units)
+
+        def of(own: Ints) -> _Fit:
+            return _Fit.of(y[own], features[own], monomials, ridge, groups[own], one_each)
+
+        folds = [(tested, of(others)) for tested, others in folds_of(units)]
+        shrinkage = _chosen_shrinkage(folds, y, theta, shrinkages)
+        everything = of(np.arange(len(y)))
+        regression = everything.regression(groups, ridge, shrinkage)
+
+        def left_out(folds: Iterable[tuple[Ints, _Fit]]) -> Floats:
+            """Error of scaled theta, the same squared in predicted deviations, and distance, of each. (3, K)."""
+            results = np.full((3, len(y)), np.nan)
+            for tested, fit in folds:
+                other = fit.regression(groups[tested], ridge, shrinkage)
+                for k in tested.tolist():
+                    found, covariance = other.estimate(y[k], MARGIN)
+                    miss = found - theta[k]
+                    squared = float(miss @ np.linalg.solve(covariance, miss))
+                    results[:, k] = np.linalg.norm(miss / monomials.scale), squared, other.distance(y[k], found)
+            return results
+
+        results = left_out(folds)
+        tests = [results[1]]
+        error = float(np.nanmean(results[0])) if folds and units is groups else np.inf
+        if units is groups and one_each:
+            # Whole groups test extrapolation; how movements of one theta vary is tested by leaving out single ones.
+            shuffled = np.random.default_rng(0).permutation(len(y))
+            results = left_out((tested, of(others)) for tested, others in folds_of(shuffled))
+            tests.append(results[1])
+        distances = results[2]
+        n_persons = None if one_each else len(np.unique(groups))
+        inflation = inflation_of([one[np.isfinite(one)] for one in tests], theta.shape[1], n_persons)
         # Movements that no fold tested are compared with a covariance that includes them.
-        distances = (solve_triangular(triangle, (left_out / deviation).T, lower=True) ** 2).sum(axis=0)
-        for fold, distance in zip(folds, tested, strict=False):
-            distances[fold.members] = distance
-        root: Floats = deviation[:, None] * triangle
-        return cls(monomials, coefficients, root, inflation, distances, groups, ridge, shrinkage), error
+        untested = np.flatnonzero(np.isnan(distances)).tolist()
+        distances[untested] = [regression.distance(y[k], theta[k]) for k in untested]
+        return replace(regression, inflation=inflation, distances=distances), error
 
     def mean(self, theta: Floats) -> Floats:
         """Z phi(theta). Shape (n,)."""
         result: Floats = self.coefficients @ self.monomials.at(theta)
         return result
+
+    def variance_at(self, theta: Floats) -> float:
+        """Factor on C for an unseen movement of theta (P,): 1 + phi' V phi."""
+        phi = self.monomials.at(theta)
+        return 1.0 + float(phi @ self.uncertainty @ phi)
 
     def estimate(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
         """Most likely theta (P,) and its widened covariance (P, P).
@@ -122,25 +143,24 @@ class CorrelatedRegression:
         self._check_length(y)
         _, projector, triangle = self._condensing
         own, bound = self.monomials, 1.0 + 2.0 * margin
-        position, slopes = nearest(own.starts, bound, own.exponents, projector @ y, triangle, NEWTON_STEPS)
-        information = slopes.T @ slopes
+        position, slopes = nearest(
+            own.starts, bound, own.exponents, own.logistic, projector @ y, triangle, NEWTON_STEPS
+        )
+        theta: Floats = own.centre + own.scale * position
+        information = slopes.T @ slopes / self.variance_at(theta)
         information.flat[:: len(position) + 1] += 1.0 / bound**2
         covariance = np.linalg.inv(information) * (self.inflation * own.scale[:, None] * own.scale)
-        return own.centre + own.scale * position, covariance
+        return theta, covariance
 
     def distance(self, y: Floats, theta: Floats) -> float:
-        """Squared Mahalanobis distance of a movement (n,) from that of theta (P,)."""
+        """Squared Mahalanobis distance of a movement (n,) from that of theta (P,), plus n ln(1 + phi' V phi).
+
+        With that, -2 ln of the density up to a constant: what theta far from the training allow is not likely for it.
+        """
         self._check_length(y)
         white = self._condensing[0] @ (y - self.mean(theta))
-        return float(white @ white)
-
-    def aligned_parts(
-        self, sequence: Floats, movement: Movement, begins: Ints, alignments: int, margin: float
-    ) -> Floats:
-        """See `search_kernels.aligned_parts`; theta is that of `estimate`."""
-        _, projector, triangle = self._condensing
-        starts, bound = self.monomials.starts, 1.0 + 2.0 * margin
-        return aligned_parts(sequence, movement, begins, alignments, starts, bound, projector, triangle, NEWTON_STEPS)
+        factor = self.variance_at(theta)
+        return float(white @ white) / factor + len(y) * float(np.log(factor))
 
     def widened(self, covariance: Floats) -> CorrelatedRegression:
         """With noise of that covariance (n, n) in every movement."""
@@ -149,10 +169,10 @@ class CorrelatedRegression:
         distances = distances_with_noise(self.distances, own, moments, covariance)
         return replace(self, root=np.linalg.cholesky(own + covariance).astype(np.float64), distances=distances)
 
-    def log_density(self, y: Floats, distance: float) -> float:
-        """Logarithm of the density of y (n,) at a squared Mahalanobis distance."""
+    def log_density(self, distance: float) -> float:
+        """Logarithm of the density of a movement at a `distance`."""
         diagonal = np.diagonal(self.root)
-        return float(-0.5 * distance - np.log(diagonal).sum() - 0.5 * len(y) * np.log(2.0 * np.pi))
+        return float(-0.5 * distance - np.log(diagonal).sum() - 0.5 * len(diagonal) * np.log(2.0 * np.pi))
 
     def log_p_value(self, distance: float) -> float:
         """Logarithm of the probability that a genuine movement lies as far from the model or farther.
@@ -170,32 +190,32 @@ class CorrelatedRegression:
     def arrays(self) -> dict[str, Floats]:
         """Everything learned, for a file."""
         scalars = np.array([self.inflation, self.shrinkage, *self.ridge])
-        own = {"coefficients": self.coefficients, "root": self.root, "distances": self.distances, "scalars": scalars}
-        return own | {"groups": self.groups.astype(np.float64)}
+        return {
+            "coefficients": self.coefficients, "uncertainty": self.uncertainty, "root": self.root,
+            "distances": self.distances, "groups": self.groups.astype(np.float64), "scalars": scalars,
+        }  # fmt: skip
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, Floats], prefix: str, monomials: Monomials) -> CorrelatedRegression:
-        """From the result of `arrays`, with a prefix to the names. Raises ValueError for shapes that do not fit.
-
-        Files of earlier releases hold no groups: each movement is then one of its own.
-        """
-        coefficients, root = arrays[f"{prefix}coefficients"], arrays[f"{prefix}root"]
-        distances, scalars = arrays[f"{prefix}distances"], arrays[f"{prefix}scalars"]
-        count = len(coefficients)
-        groups = arrays.get(f"{prefix}groups", np.arange(float(len(distances))))
-        if groups.shape != distances.shape:
-            raise ValueError(f"expected {prefix}groups of shape {distances.shape}, found {groups.shape}")
-        if coefficients.shape != (count, len(monomials)) or root.shape != (count, count) or distances.ndim != 1:
-            raise ValueError(
-                f"expected {prefix}coefficients of shape (n, {len(monomials)}) and root of shape (n, n), "
-                f"found {coefficients.shape} and {root.shape}"
-            )
-        if not (np.diagonal(root) > 0).all() or scalars.ndim != 1 or len(scalars) < 3 or not scalars[0] > 0:
+        """From the result of `arrays`, with a prefix to the names. Raises ValueError for shapes that do not fit."""
+        own = {
+            name: arrays[f"{prefix}{name}"]
+            for name in ("coefficients", "uncertainty", "root", "distances", "groups", "scalars")
+        }
+        count, size, scalars = len(own["coefficients"]), len(monomials), own["scalars"]
+        expected: dict[str, tuple[int, ...]]
+        expected = {"coefficients": (count, size), "uncertainty": (size, size), "root": (count, count)}
+        expected |= {"distances": own["groups"].shape, "groups": (len(own["distances"]),)}
+        for name, shape in expected.items():
+            if own[name].shape != shape:
+                raise ValueError(f"expected {prefix}{name} of shape {shape}, found {own[name].shape}")
+        if not (np.diagonal(own["root"]) > 0).all() or scalars.ndim != 1 or len(scalars) < 3 or not scalars[0] > 0:
             raise ValueError(f"expected a root with a positive diagonal and an inflation above 0 in {prefix}scalars")
         inflation, shrinkage, *ridge = (float(one) for one in scalars)
         return cls(
-            monomials, coefficients, root, inflation, distances, groups.astype(np.int64), tuple(ridge), shrinkage
-        )
+            monomials, own["coefficients"], own["uncertainty"], own["root"], inflation, own["distances"],
+            own["groups"].astype(np.int64), tuple(ridge), shrinkage,
+        )  # fmt: skip
 
     def _check_length(self, y: Floats) -> None:
         if len(y) != len(self.coefficients):
@@ -213,97 +233,78 @@ class CorrelatedRegression:
 
 
 @dataclass(frozen=True)
-class LeftOutFold:
-    """Movements left out of a regression: residuals (k, n) and slopes (k, n, P) by the others' coefficients.
+class _Fit:
+    """Coefficients of some of the movements, before anything is chosen; residuals are studentised, (K, n)."""
 
-    `members` (k,) are their numbers.
-
-    `reference` are residuals of the others, each left out in turn, by regressions without the tested movements:
-    otherwise the covariance would include the noise of those.
-    """
-
-    members: Ints
-    reference: Floats
+    monomials: Monomials
+    coefficients: Floats
+    uncertainty: Floats
     residuals: Floats
-    slopes: Floats
+
+    @classmethod
+    def of(
+        cls, y: Floats, features: Floats, monomials: Monomials, ridge: tuple[float, ...], groups: Ints, one_each: bool
+    ) -> _Fit:
+        """`one_each`: groups are those of one theta, not of one person, whose movements have more in common."""
+        penalty = penalties(ridge, monomials.degrees, len(y))
+        uncertainty = np.linalg.inv(features.T @ features + penalty).astype(np.float64)
+        coefficients = np.ascontiguousarray((uncertainty @ (features.T @ y)).T)  # as after reading a file
+        rescaled = studentised_residuals if one_each else residuals_left_out
+        return cls(monomials, coefficients, uncertainty, rescaled(y, features, penalty, groups))
+
+    def root(self, shrinkage: float) -> Floats:
+        return np.linalg.cholesky(shrunk(self.residuals, shrinkage)).astype(np.float64)
+
+    def regression(self, groups: Ints, ridge: tuple[float, ...], shrinkage: float) -> CorrelatedRegression:
+        """Not calibrated yet."""
+        return CorrelatedRegression(
+            self.monomials, self.coefficients, self.uncertainty, self.root(shrinkage), 1.0, np.zeros(len(groups)),
+            groups, ridge, shrinkage,
+        )  # fmt: skip
 
 
-def _folds(y: Floats, theta: Floats, monomials: Monomials, penalty: Floats, groups: Ints) -> list[LeftOutFold]:
-    features, folds = monomials.at(theta), []
-    for tested, others in folds_of(groups):
-        known = features[others]
-        coefficients = np.linalg.solve(known.T @ known + penalty, known.T @ y[others]).T
-        slopes = np.stack([coefficients @ monomials.jacobian(one) * monomials.scale for one in theta[tested]])
-        reference = residuals_left_out(y[others], known, penalty, groups[others])
-        folds.append(LeftOutFold(tested, reference, y[tested] - features[tested] @ coefficients.T, slopes))
-    return folds
+def _left_out_units(theta: Floats, monomials: Monomials, groups: Ints) -> Ints:
+    """What cross-validation leaves out: groups, or single movements where a theta left out could not be predicted."""
+    few = len(np.unique(groups)) <= len(monomials) + 1 and one_theta_each(theta, groups)
+    return np.arange(len(theta)) if few else groups
 
 
-def chosen_shrinkage(
-    folds: list[LeftOutFold], candidates: tuple[float, ...]
-) -> tuple[float, Floats, list[Floats], float]:
-    """Shrinkage with the smallest error of theta on left-out movements.
+def _chosen_shrinkage(folds: list[tuple[Ints, _Fit]], y: Floats, theta: Floats, candidates: tuple[float, ...]) -> float:
+    """Shrinkage that makes theta of left-out movements most likely.
 
-    Also these errors in predicted deviations, of all folds, the distances of the movements of each fold, mean error.
+    Regions may be inflated later, so it is their shape and their relative size that count.
     """
-    best, minimum = (candidates[-1], np.zeros(0), list[Floats](), np.inf), np.inf
-    for shrinkage in candidates:
-        tested = [_tested(fold, shrinkage) for fold in folds]
-        if not tested:
-            break
-        error, excess, _ = np.concatenate(tested, axis=1)
-        total = float(np.sqrt(error + 1e-12).mean())
-        if total < minimum:
-            minimum = total
-            best = shrinkage, excess, [np.maximum(distance, 0.0) for _, _, distance in tested], total
+    best, smallest = candidates[-1], np.inf
+    for shrinkage in candidates if folds else ():
+        results = [_linearised(fit, fit.root(shrinkage), y[tested], theta[tested]) for tested, fit in folds]
+        excess, log_volumes = np.concatenate(results, axis=1)
+        score = float(log_volumes.mean()) + theta.shape[1] * float(np.log(excess.mean() + 1e-300))
+        if score < smallest:
+            best, smallest = shrinkage, score
     return best
 
 
-def _tested(fold: LeftOutFold, shrinkage: float) -> Floats:
-    """Squared error of theta, the same in predicted deviations, and distance, of each tested movement. Shape (3, k)."""
-    dimension = fold.slopes.shape[-1]
-    solved = _solved(fold.reference, shrinkage, np.concatenate([fold.residuals.T, *fold.slopes], axis=1))
-    count = len(fold.residuals)
-    result = np.empty((3, count))
-    for k in range(count):
-        wide = solved[:, count + k * dimension : count + (k + 1) * dimension]
-        gradient = wide.T @ fold.residuals[k]
-        error = _solved_or_shortest(fold.slopes[k].T @ wide + 1e-9 * np.eye(dimension), gradient)
-        excess = float(error @ gradient)
-        result[:, k] = error @ error, excess, fold.residuals[k] @ solved[:, k] - excess
-    return result
-
-
-def _solved_or_shortest(matrix: Floats, right: Floats) -> Floats:
-    """matrix^-1 right; the shortest solution where two or three movements do not determine a direction of theta."""
-    try:
-        return np.linalg.solve(matrix, right).astype(np.float64)
-    except np.linalg.LinAlgError:
-        return np.linalg.lstsq(matrix, right)[0].astype(np.float64)
-
-
-def deviations_of(residuals: Floats) -> Floats:
-    """Standard deviations of residuals (K, n), none much below the mean one. Shape (n,)."""
-    deviation = np.sqrt((residuals**2).mean(axis=0))
-    result: Floats = np.maximum(deviation, MIN_RELATIVE_DEVIATION * float(np.sqrt((deviation**2).mean())) + 1e-12)
-    return result
+def _linearised(fit: _Fit, root: Floats, y: Floats, theta: Floats) -> Floats:
+    """Squared error of theta in predicted deviations and log-volume of its region, of each movement. Shape (2, k)."""
+    own, (count, dimension) = fit.monomials, theta.shape
+    phi = own.at(theta)
+    slopes = np.stack([fit.coefficients @ own.jacobian(one) * own.scale for one in theta], axis=1)  # (n, k, P)
+    wide = np.concatenate([slopes, (y - phi @ fit.coefficients.T).T[:, :, None]], axis=2).reshape(len(root), -1)
+    white = solve_triangular(root, wide, lower=True, check_finite=False).reshape(-1, count, dimension + 1)
+    slopes, missed = white[..., :-1], white[..., -1]
+    factor = 1.0 + np.einsum("kf,fg,kg->k", phi, fit.uncertainty, phi)
+    information = np.einsum("nkp,nkq->kpq", slopes, slopes) / factor[:, None, None]
+    information += np.eye(dimension) / (1.0 + 2.0 * MARGIN) ** 2
+    gradient = np.einsum("nkp,nk->kp", slopes, missed) / factor[:, None]
+    error = np.linalg.solve(information, gradient[..., None])[..., 0]
+    excess = np.einsum("kp,kp->k", error, gradient)
+    return np.stack([excess, -np.linalg.slogdet(information)[1]])
 
 
 def shrunk(residuals: Floats, shrinkage: float) -> Floats:
-    """Second moments of standardised residuals (K, n), correlations shrunk. Shape (n, n)."""
+    """Second moments of residuals (K, n), correlations shrunk. Shape (n, n)."""
     moments = residuals.T @ residuals / len(residuals)
-    diagonal = np.diag(np.maximum(np.diagonal(moments), 1e-6))
-    result: Floats = (1.0 - shrinkage) * moments + shrinkage * diagonal + 1e-6 * np.eye(len(moments))
-    return result
-
-
-def _solved(residuals: Floats, shrinkage: float, right: Floats) -> Floats:
-    """C^-1 right for the shrunk second moments of (K, n) residuals; K may be much less than n (Woodbury)."""
-    diagonal = shrinkage * np.maximum((residuals**2).mean(axis=0), 1e-6) + 1e-6
-    scaled: Floats = right / diagonal[:, None]
-    if shrinkage >= 1.0:
-        return scaled
-    factor = residuals.T * np.sqrt((1.0 - shrinkage) / len(residuals))
-    inner = np.eye(len(residuals)) + factor.T @ (factor / diagonal[:, None])
-    result: Floats = scaled - (factor / diagonal[:, None]) @ np.linalg.solve(inner, factor.T @ scaled)
+    variances = np.maximum(np.diagonal(moments), 1e-12)
+    result: Floats = (1.0 - shrinkage) * moments
+    result.flat[:: len(moments) + 1] += shrinkage * variances + 1e-6 * variances.mean()
     return result

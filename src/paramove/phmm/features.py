@@ -1,4 +1,4 @@
-"""Monomials of the parameters: what makes a linear PHMM quadratic, cubic or of any degree (thesis 4.2.3)."""
+"""Features of the parameters: monomials make a linear PHMM quadratic, cubic or of any degree (thesis 4.2.3)."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import expit
 
 from paramove.documents import Floats, Ints
 from paramove.hmm import compiled
 
 MAX_MONOMIALS = 5000
 MAX_PARAMETERS = 12
+MAX_STARTS = 32
 
 
 @dataclass(frozen=True)
@@ -24,11 +26,13 @@ class Monomials:
     Attributes:
         exponents: power of each component of u in each monomial, the constant first, then by degree. Shape (F, P).
         centre, scale: of theta, shape (P,), in the unit of theta.
+        units: W1 and, last, b1 of logistic units of u (3.5) after the monomials, (H, P + 1); None: there are none.
     """
 
     exponents: Ints
     centre: Floats
     scale: Floats
+    units: Floats | None = None
 
     @classmethod
     def of_degree(cls, degree: int, theta: Floats) -> Monomials:
@@ -52,32 +56,46 @@ class Monomials:
 
     @property
     def degrees(self) -> Ints:
-        """Degree of each monomial. Shape (F,)."""
-        result: Ints = self.exponents.sum(axis=1)
-        return result
+        """Degree of each monomial; of logistic units one more than the largest. Shape (F + H,)."""
+        degrees: Ints = self.exponents.sum(axis=1)
+        return np.concatenate([degrees, np.full(len(self.logistic), degrees.max() + 1)])
+
+    @cached_property
+    def logistic(self) -> Floats:
+        """`units`, empty if there are none."""
+        return self.units if self.units is not None else np.zeros((0, len(self.centre) + 1))
 
     @cached_property
     def starts(self) -> Floats:
-        """Scaled starting points of the search for theta: the middle, and half-way to corners unless linear. (S, P)."""
+        """Scaled starting points of the search for theta: the middle, and half-way to corners unless linear. (S, P).
+
+        With logistic units a grid, finer where theta has few components.
+        """
         middle = np.zeros((1, len(self.centre)))
+        if len(self.logistic):
+            n_lines = max(2, int(MAX_STARTS ** (1.0 / len(self.centre)) + 1e-9))
+            line = np.linspace(-1.0, 1.0, 2 * n_lines + 1)[1::2]
+            return np.concatenate([middle, list(itertools.product(line, repeat=len(self.centre)))])
         if self.degrees.max() <= 1:
             return middle
         return np.concatenate([middle, list(itertools.product((-0.5, 0.5), repeat=len(self.centre)))])
 
     def __len__(self) -> int:
-        return len(self.exponents)
+        return len(self.exponents) + len(self.logistic)
 
     def at(self, theta: ArrayLike) -> Floats:
-        """Values for theta (..., P). Shape (..., F)."""
+        """Values for theta (..., P). Shape (..., F + H)."""
         u = (np.asarray(theta, dtype=np.float64) - self.centre) / self.scale
         result: Floats = np.prod(u[..., None, :] ** self.exponents, axis=-1)
-        return result
+        if self.units is None:
+            return result
+        return np.concatenate([result, expit(u @ self.units[:, :-1].T + self.units[:, -1])], axis=-1)
 
     def jacobian(self, theta: ArrayLike) -> Floats:
-        """Derivatives with respect to theta (P,). Shape (F, P)."""
+        """Derivatives with respect to theta (P,). Shape (F + H, P)."""
         u = (np.asarray(theta, dtype=np.float64) - self.centre) / self.scale
         values, slopes = np.empty(len(self)), np.empty((len(self), len(u)))
-        monomials_at(u, self.exponents, values, slopes)
+        features_at(u, self.exponents, self.logistic, values, slopes)
         result: Floats = slopes / self.scale
         return result
 
@@ -103,3 +121,18 @@ def monomials_at(u: Floats, exponents: Ints, values: Floats, slopes: Floats) -> 
                 for _ in range(power):
                     slope *= u[other]
             slopes[f, p] = slope
+
+
+@compiled
+def features_at(u: Floats, exponents: Ints, units: Floats, values: Floats, slopes: Floats) -> None:
+    """`monomials_at`, followed by the logistic units (H, P + 1), written in place."""
+    n_monomials, n_components = exponents.shape
+    monomials_at(u, exponents, values, slopes)
+    for h in range(len(units)):
+        total = units[h, n_components]
+        for p in range(n_components):
+            total += units[h, p] * u[p]
+        value = 1.0 / (1.0 + np.exp(-total))
+        values[n_monomials + h] = value
+        for p in range(n_components):
+            slopes[n_monomials + h, p] = value * (1.0 - value) * units[h, p]

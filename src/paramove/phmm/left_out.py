@@ -1,6 +1,6 @@
 """Folds of cross-validation over groups, and inflation of covariances of theta by errors of left-out movements."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.special import chdtri  # scipy.stats would take half a second to import
@@ -29,16 +29,30 @@ def folds_of(groups: Ints) -> Iterator[tuple[Ints, Ints]]:
             yield tested, others
 
 
-def inflation_of(excess: Floats, dimension: int, n_groups: int, minimum: float) -> float:
+def one_theta_each(theta: Floats, groups: Ints) -> bool:
+    """Whether movements of a group have the same theta, up to a tenth of its range; false for persons."""
+    widths = np.maximum(np.ptp(theta, axis=0), 1e-300)
+    within = (np.ptp(theta[groups == group], axis=0) for group in np.unique(groups))
+    return bool(max(float((one / widths).max()) for one in within) < 0.1)
+
+
+def inflation_of(tests: Sequence[Floats], dimension: int, n_persons: int | None) -> float:
     """Factor on covariances of theta that gives regions their nominal coverage.
 
+    It lies half-way between what the mean and the 95 % quantile of the errors need.
+
     Args:
-        excess: squared errors of left-out movements in predicted deviations, (K,); none if nothing could be left out.
-        dimension: P. n_groups: how many different groups those are from. minimum: lower bound of the result.
+        tests: squared errors of left-out movements in predicted deviations, (K,), of one or several ways to leave out;
+            the largest factor counts. None or empty if nothing could be left out.
+        dimension: P.
+        n_persons: how many persons the errors are from: few determine tails badly. None: errors are independent.
     """
-    few = (n_groups + dimension) / max(1, n_groups - 1)  # few groups determine the tails badly
-    if not len(excess):
-        return few
-    level = min(1.0, 0.95 * (1.0 + 1.0 / len(excess)))
-    tail = float(np.quantile(excess, level)) / float(chdtri(dimension, 0.05))
-    return few * max(minimum, float(excess.mean()) / dimension, tail)
+    few = 1.0 if n_persons is None else (n_persons + dimension) / max(1, n_persons - 1)
+    factors = [1.0]
+    for excess in tests:
+        if len(excess):
+            level = min(1.0, 0.95 * (1.0 + 1.0 / len(excess)))
+            mean = float(excess.mean()) / dimension
+            tail = float(np.quantile(excess, level)) / float(chdtri(dimension, 0.05))
+            factors.append(0.5 * (mean + max(mean, tail)))
+    return few * max(factors[1:] or factors)

@@ -20,9 +20,13 @@ from paramove.phmm.predictive_distribution import PredictiveDistribution
 FIRST_FRAMES, GROWTH = 5, 1.25
 """Beginnings are modelled at 5 frames and then at every length a quarter longer."""
 BEGINNING_POINTS = 5
-MOVEMENT_PARTS = (5, 3, 10)
-"""Candidates for the number of parts of a movement: the best predictor of theta of left-out groups is chosen."""
+PARTS, PART_FRAMES = 5, 20
+"""A complete movement is described by the means of its fifths, of 20 interpolated frames each, and its last frame."""
+LATE_ROWS = 2
+"""Rows of that description that alone may predict theta better: of movements that end at their target."""
 BEGINNING_SHRINKAGES = (0.1, 0.3)
+OUTLIER_SHRINKAGE = 0.2
+"""What estimates theta best is too forgiving for movements of another kind: it takes correlations for chance."""
 PACE_PARTS, PACE_SHRINKAGE, PACE_WEIGHT = 10, 0.1, 0.35
 
 
@@ -77,7 +81,8 @@ class Performances:
     """Correlated regressions of complete movements (in parts) and of beginnings of n frames.
 
     Attributes:
-        complete: of `part_averages`.
+        complete: of `movement_parts`, for outliers.
+        estimating: of all or the last rows of that, whichever predicts theta of left-out groups better.
         beginnings: number of frames, increasing, with the regression of `beginning_features`.
         pace: of complete movements.
         noise: beyond that of the training that is expected of sequences.
@@ -86,14 +91,17 @@ class Performances:
     complete: CorrelatedRegression
     beginnings: tuple[tuple[int, CorrelatedRegression], ...]
     pace: Pace
+    estimating: CorrelatedRegression
     noise: AddedNoise | None = None
 
     @classmethod
-    def fitted(
-        cls, parts: Sequence[Floats], sequences: Sequence[Floats], theta: Floats, monomials: Monomials, groups: Ints
-    ) -> Performances:
-        """From `part_averages` (K, n) for each of `MOVEMENT_PARTS`, and movements as recorded, in their own time."""
-        complete = CorrelatedRegression.best_fitted(parts, theta, monomials, groups)
+    def fitted(cls, sequences: Sequence[Floats], theta: Floats, monomials: Monomials, groups: Ints) -> Performances:
+        """From movements as recorded, in their own time."""
+        parts = np.stack([movement_parts(sequence) for sequence in sequences])
+        last = parts[:, -LATE_ROWS * sequences[0].shape[1] :]
+        complete = CorrelatedRegression.fitted(parts, theta, monomials, groups, shrinkages=(OUTLIER_SHRINKAGE,))
+        estimating, error = CorrelatedRegression.fitted_with_error(parts, theta, monomials, groups, complete.ridge)
+        late, late_error = CorrelatedRegression.fitted_with_error(last, theta, monomials, groups)
         lengths = np.array([len(sequence) for sequence in sequences])
         beginnings = []
         for n_frames in beginning_lengths(lengths):
@@ -104,18 +112,20 @@ class Performances:
                     y, theta[long], monomials, groups[long], complete.ridge, BEGINNING_SHRINKAGES
                 ))
             )  # fmt: skip
-        return cls(complete, tuple(beginnings), Pace.fitted(sequences, groups))
+        pace = Pace.fitted(sequences, groups)
+        return cls(complete, tuple(beginnings), pace, late if late_error < error else estimating)
 
-    def expecting(self, noise: AddedNoise, gamma: Floats) -> Performances:
-        """The same for a sequence with noise, whose frames are in the states with responsibilities (N, T)."""
-        n_parts = self.n_parts(noise.sequence.shape[1])
-        of_parts = noise.of_averages(lambda frames: part_averages(*state_averages(gamma, frames), frames, n_parts))
-        pace = self.pace.expecting(noise.variance, noise.sequence)
-        return replace(self, complete=self.complete.widened(of_parts), pace=pace, noise=noise)
+    def expecting(self, noise: AddedNoise) -> Performances:
+        """The same for a sequence with noise."""
+        of_parts = replace(noise, n_frames=None).of_averages(movement_parts)
+        pace, n_last = self.pace.expecting(noise.variance, noise.sequence), len(self.estimating.coefficients)
+        estimating = self.estimating.widened(of_parts[-n_last:, -n_last:])
+        complete = self.complete.widened(of_parts)
+        return replace(self, complete=complete, pace=pace, estimating=estimating, noise=noise)
 
-    def n_parts(self, dimension: int) -> int:
-        """Number of parts of complete movements with this many coordinates."""
-        return len(self.complete.coefficients) // dimension - 1
+    def estimate(self, parts: Floats, margin: float) -> tuple[Floats, Floats]:
+        """Theta (P,) and its covariance (P, P) of a complete movement, from its `movement_parts`."""
+        return self.estimating.estimate(parts[-len(self.estimating.coefficients) :], margin)
 
     def outlier_score(self, distance: float, pace_distance: float) -> float:
         """Distance of a complete movement from the training; about 1.3 for genuine ones.
@@ -156,6 +166,7 @@ class Performances:
     def arrays(self) -> dict[str, Floats]:
         """Everything learned, for a file."""
         result = {f"complete_{name}": value for name, value in self.complete.arrays().items()}
+        result |= {f"estimating_{name}": value for name, value in self.estimating.arrays().items()}
         result |= {"pace_mean": self.pace.mean, "pace_root": self.pace.root, "pace_distances": self.pace.distances}
         result["beginning_frames"] = np.array([float(n_frames) for n_frames, _ in self.beginnings])
         for number, (_, regression) in enumerate(self.beginnings):
@@ -166,6 +177,12 @@ class Performances:
     def from_arrays(cls, arrays: dict[str, Floats], monomials: Monomials) -> Performances:
         """From the result of `arrays`. Raises KeyError for a missing array, ValueError for shapes that do not fit."""
         complete = CorrelatedRegression.from_arrays(arrays, "complete_", monomials)
+        estimating = CorrelatedRegression.from_arrays(arrays, "estimating_", monomials)
+        if len(estimating.coefficients) > len(complete.coefficients):
+            raise ValueError(
+                f"expected estimating_coefficients of at most {len(complete.coefficients)} rows, found "
+                f"{len(estimating.coefficients)}"
+            )
         beginnings = tuple(
             (int(n_frames), CorrelatedRegression.from_arrays(arrays, f"beginning{number}_", monomials))
             for number, n_frames in enumerate(arrays["beginning_frames"])
@@ -176,7 +193,7 @@ class Performances:
         for name, shape in expected.items():
             if arrays[name].shape != shape:
                 raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
-        return cls(complete, beginnings, pace)
+        return cls(complete, beginnings, pace, estimating)
 
 
 def _outlier_score(distance: Any, pace_distance: Any, known: Floats, known_pace: Floats) -> Any:
@@ -226,22 +243,16 @@ def state_averages(gamma: Floats, sequence: Floats) -> tuple[Floats, Floats]:
     return (gamma @ sequence) / weights[:, None], weights
 
 
-def part_averages(averages: Floats, weights: Floats, sequence: Floats, n_parts: int) -> Floats:
-    """Mean of the frames in each of at most `n_parts` parts of the movement (several states each), and the last frame.
+def movement_parts(sequence: Floats) -> Floats:
+    """Means of the fifths of a movement (T, D) and its last frame. Shape (6 D,).
 
-    Correlations between many states would have to be learned from few movements and are redundant. The last frame is
-    included since theta determines the end of a movement more exactly than its course. Shape ((n + 1) D,).
+    Correlations between more parts would have to be learned from few movements and are redundant. The last frame is
+    included since theta determines the end of a movement more exactly than its course. Parts of equal time need no
+    alignment by a model, which for movements that vary little would be decided by noise.
     """
-    begins = part_begins(len(averages), n_parts)
-    sums = np.add.reduceat(averages * weights[:, None], begins, axis=0)
-    parts = sums / np.add.reduceat(weights, begins)[:, None]
-    return np.concatenate([parts, sequence[-1:]]).ravel()
-
-
-def part_begins(n_states: int, n_parts: int) -> Ints:
-    """First state of each of at most `n_parts` parts."""
-    n_parts = min(n_parts, n_states)
-    return np.arange(n_parts) * n_states // n_parts
+    frames = resample(sequence, PARTS * PART_FRAMES)
+    means = frames.reshape(PARTS, PART_FRAMES, -1).mean(axis=1)
+    return np.concatenate([means, frames[-1:]]).ravel()
 
 
 def beginning_lengths(lengths: Ints) -> list[int]:

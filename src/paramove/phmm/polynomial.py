@@ -4,35 +4,28 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents import Floats, renamed_attribute
+from paramove.documents import Floats
 from paramove.hmm import (
     Evaluator,
     LeftRightHMM,
     Parameters,
     TrainingOptions,
-    check_length,
     checked_sequence,
     equal_segments,
 )
 from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
+from paramove.phmm.examining import ExaminingPHMM
 from paramove.phmm.features import Monomials
 from paramove.phmm.local_models import check_local_models
-from paramove.phmm.noise import AddedNoise, expected_responsibilities
-from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
-from paramove.phmm.performance import (
-    MOVEMENT_PARTS,
-    Performances,
-    beginning_features,
-    part_averages,
-    part_begins,
-    state_averages,
-)
+from paramove.phmm.noise import AddedNoise
+from paramove.phmm.parametric import ParameterEstimate, TrainingData
+from paramove.phmm.performance import Performances, state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
 from paramove.phmm.ridge import smoothed
 
@@ -40,36 +33,9 @@ Residuals = Literal["independent", "correlated"]
 MAX_STEPS = 40
 STEP_TOLERANCE = 1e-5
 """Predicted gain in nats below which the search ends."""
-ALIGNMENTS = 3
 
 
-class Examination(NamedTuple):
-    """A sequence examined by one model.
-
-    Attributes:
-        estimate: of theta.
-        outlier_score: distance from the training movements, see `Performances.outlier_score`; of a beginning the
-            root of its distance in units of the median one.
-        log_density: of `part_averages`, or of the features of a beginning.
-        log_p_value: logarithm of `p_value`.
-    """
-
-    estimate: ParameterEstimate
-    outlier_score: float
-    log_density: float
-    log_p_value: float
-
-    @property
-    def p_value(self) -> float:
-        """Probability that a genuine movement has at least this outlier score; a small one is a reason to reject."""
-        return float(np.exp(self.log_p_value))
-
-
-for _old, _new in (("strangeness", "outlier_score"), ("typicality", "p_value"), ("log_typicality", "log_p_value")):
-    setattr(Examination, _old, renamed_attribute(_old, _new))
-
-
-class PolynomialPHMM(ParametricHMM):
+class PolynomialPHMM(ExaminingPHMM):
     """Means mu_i = Z_i phi(theta) with all monomials of theta up to a degree; covariances do not depend on theta.
 
     Args:
@@ -133,29 +99,23 @@ class PolynomialPHMM(ParametricHMM):
         )
         performances = None
         if self.residuals == "correlated":
-            averages, performances = self._performances(data, trained, monomials)
+            performances = Performances.fitted(data.recorded, data.theta, monomials, data.groups)
             if self.smoothness is not None:
+                averages = self._state_averages(data, trained, monomials)
                 smooth = smoothed(features, monomials.degrees, averages, data.groups)
                 coefficients = smooth.reshape(coefficients.shape)
                 trained = with_coefficients(trained, coefficients, data.sequences, features, options)
         self._set_learned(monomials, trained)
         self.performances_ = performances
 
-    def _performances(
-        self, data: TrainingData, trained: RegressedParameters, monomials: Monomials
-    ) -> tuple[Floats, Performances]:
-        """State averages (K, N D), and the distribution of executions from them and the recorded movements."""
+    def _state_averages(self, data: TrainingData, trained: RegressedParameters, monomials: Monomials) -> Floats:
+        """Mean of the frames of each movement in each state. Shape (K, N D)."""
         common = Evaluator.of(trained.at(monomials.at(monomials.centre)))
-        state_means = []
+        averages = []
         for sequence, theta in zip(data.sequences, data.theta, strict=True):
             own = replace(common, means=trained.coefficients @ monomials.at(theta))
-            state_means.append(state_averages(own.expectation(sequence)[1].T, sequence))
-        parts = [
-            np.stack([part_averages(*one, x, n_parts) for one, x in zip(state_means, data.sequences, strict=True)])
-            for n_parts in MOVEMENT_PARTS
-        ]
-        averages = np.stack([one.ravel() for one, _ in state_means])
-        return averages, Performances.fitted(parts, data.recorded, data.theta, monomials, data.groups)
+            averages.append(state_averages(own.expectation(sequence)[1].T, sequence)[0].ravel())
+        return np.stack(averages)
 
     def _set_learned(self, monomials: Monomials, learned: RegressedParameters) -> None:
         self.monomials_ = monomials
@@ -186,16 +146,14 @@ class PolynomialPHMM(ParametricHMM):
         """The most likely theta, its covariance, and the log-likelihood there, of a movement or of its beginning.
 
         With independent residuals the maximum of the likelihood, by EM (3.5), generalised where means are not linear.
-        With correlated ones theta follows from the averages of the states, by generalised least squares. A beginning
+        With correlated ones theta follows from `movement_parts`, by generalised least squares. A beginning
         (`finished=False`) has the frame rate of the training; its log-likelihood is that of `beginning_features`.
         """
-        if not finished:
-            return self.examine(sequence, finished=False).estimate
+        if not finished or self.performances_ is not None:
+            return super().estimate(sequence, finished=finished)
         model = self._expecting_noise_of(checked_sequence(sequence, self.covariances_.shape[-1]))
         if model is not self:
             return model.estimate(sequence)
-        if self.performances_ is not None:
-            return self._refined(self._checked(sequence), self.performances_)[0]
         prepared = self._prepared(self._checked(sequence))
         best, value, gradient = self._likeliest(prepared)
         information = search_kernels.information_at(best, gradient, prepared)
@@ -203,52 +161,13 @@ class PolynomialPHMM(ParametricHMM):
         covariance = _inverse_information(information, self._widest) * np.outer(scale, scale)
         return ParameterEstimate(self.monomials_.centre + scale * best, covariance, value)
 
-    def examine(self, sequence: ArrayLike, *, finished: bool = True) -> Examination:
-        """Estimate of theta, outlier score and p-value of the sequence.
-
-        Raises ValueError for a model with independent residuals, which has no distribution of executions, and for a
-        beginning of fewer frames than are modelled.
-        """
-        if self.performances_ is None:
-            raise ValueError("this model has independent residuals: train it with residuals='correlated'")
-        recorded = checked_sequence(sequence, self.covariances_.shape[-1])
-        model = self._expecting_noise_of(recorded)
-        if model is not self:
-            return model.examine(recorded, finished=finished)
-        if not finished:
-            n_frames, regression = self.performances_.beginning(len(recorded))
-            features = beginning_features(recorded, n_frames)
-            theta, covariance = regression.estimate(features, self.search_margin)
-            distance = regression.distance(features, theta)
-            density = regression.log_density(features, distance)
-            outlier_score = float(np.sqrt(distance / (np.median(regression.distances) + 1e-9)))
-            estimate = ParameterEstimate(theta, covariance, density)
-            return Examination(estimate, outlier_score, density, regression.log_p_value(distance))
-        estimate, parts = self._refined(self._checked(recorded), self.performances_)
-        distance = self.performances_.complete.distance(parts, estimate.theta)
-        outlier_score = self.performances_.outlier_score(distance, self.performances_.pace.distance(recorded))
-        density = self.performances_.complete.log_density(parts, distance)
-        return Examination(estimate, outlier_score, density, self.performances_.log_p_value(outlier_score))
-
-    def _refined(self, checked: Floats, performances: Performances) -> tuple[ParameterEstimate, Floats]:
-        """Estimate from the distribution of whole executions, and the averages of the parts of this one.
-
-        The timing of a movement hardly depends on theta: the middle theta gives the alignment of frames and states,
-        their averages give theta, which changes the alignment a little.
-        """
-        prepared, regression = self._prepared(checked), performances.complete
-        begins = part_begins(self.n_states, performances.n_parts(checked.shape[1]))
-        parts = regression.aligned_parts(checked, prepared, begins, ALIGNMENTS, self.search_margin)
-        theta, covariance = regression.estimate(parts, self.search_margin)
-        value = search_kernels.log_likelihood_at((theta - self.monomials_.centre) / self.monomials_.scale, prepared)
-        return ParameterEstimate(theta, covariance, float(value)), parts
+    def _log_likelihood_at(self, checked: Floats, theta: Floats) -> float:
+        position = (theta - self.monomials_.centre) / self.monomials_.scale
+        return float(search_kernels.log_likelihood_at(position, self._prepared(checked)))
 
     def _expect(self, noise: AddedNoise) -> None:
-        self.covariances_ = self.covariances_ + noise.of_states
+        super()._expect(noise)
         self._white = None
-        if self.performances_ is not None:
-            gamma = expected_responsibilities(self.durations_, noise.n_model_frames)
-            self.performances_ = self.performances_.expecting(noise, gamma)
 
     @property
     def _widest(self) -> float:
@@ -277,18 +196,6 @@ class PolynomialPHMM(ParametricHMM):
             evaluator = Evaluator.of(self.at(self.monomials_.centre).parameters)
             self._white = evaluator, np.ascontiguousarray(evaluator.whitening @ self.coefficients_)
         return self._white
-
-    def _checked(self, sequence: ArrayLike) -> Floats:
-        checked = self._resampled(checked_sequence(sequence, self.covariances_.shape[-1]))
-        check_length(len(checked), self.n_states, self.d_min, self.d_max)
-        return checked
-
-    def _checked_theta(self, theta: ArrayLike) -> Floats:
-        values = np.asarray(theta, dtype=np.float64)
-        n_components = len(self.monomials_.centre)
-        if values.shape[-1:] != (n_components,) or values.ndim > 2 or not np.isfinite(values).all():
-            raise ValueError(f"theta has {n_components} finite components, found shape {values.shape}: {values}")
-        return values
 
     @classmethod
     def _parameter_names(cls) -> list[str]:

@@ -14,6 +14,8 @@ STRENGTHS = np.append(10.0 ** np.arange(-5.0, 1.1, 0.5), 1e4)
 MAX_ROUNDS = 4
 SIMPLER = 0.005
 """A degree above 1 is regularised as far as possible while errors grow by no more than this fraction."""
+MIN_LEFT = 1e-3
+"""A residual of which the fit took all but this fraction says nothing about the movement."""
 OFFSETS = (0.0, 0.1, 0.3, 1.0, 3.0)
 """Candidates for the variance of `GroupOffsets`."""
 
@@ -68,18 +70,51 @@ def smoothed(features: Floats, degrees: Ints, values: Floats, groups: Ints) -> F
 
 
 def residuals_left_out(y: Floats, features: Floats, penalty: Floats, groups: Ints) -> Floats:
-    """Residual of each movement from a regression without its group, for all at once. Shape (K, n)."""
-    hat = features @ np.linalg.solve(features.T @ features + penalty, features.T)
-    residuals: Floats = y - hat @ y
+    """Residual of each movement from a regression without its group, for all at once: (I - H)^-1 r. Shape (K, n).
+
+    Of a single group: its own residuals, as large as their degrees of freedom say.
+    """
     if len(np.unique(groups)) < 2:
-        widened: Floats = residuals * float(np.sqrt(len(y) / max(1.0, len(y) - np.trace(hat))))
-        return widened
-    result = np.empty_like(residuals)
-    for members in members_of(groups):
-        own = np.eye(len(members)) - hat[np.ix_(members, members)]
-        own += 1e-9 * np.eye(len(members))
-        result[members] = np.linalg.solve(own, residuals[members])
+        return studentised_residuals(y, features, penalty, groups)
+    return _rescaled(y, features, penalty, groups, 1.0, 1e-9)[0]
+
+
+def studentised_residuals(y: Floats, features: Floats, penalty: Floats, groups: Ints) -> Floats:
+    """(I - H)^-1/2 r of each group: residuals with the covariance of the movements, whatever the fit took. (K, n).
+
+    Directions that the fit took completely are lost; the others stand for them.
+    """
+    residuals, known = _rescaled(y, features, penalty, groups, 0.5, MIN_LEFT)
+    result: Floats = residuals * np.sqrt(len(y) / max(1.0, known))
     return result
+
+
+def _rescaled(
+    y: Floats, features: Floats, penalty: Floats, groups: Ints, power: float, minimum: float
+) -> tuple[Floats, float]:
+    """(I - H)^-power r of each group, (K, n), and how many of the K directions the fit did not take.
+
+    Eigenvalues of I - H are at least `minimum`.
+
+    H = F V F' of a group has at most as many eigenvalues s above 0 as there are features: those of L' F' F L, with
+    V = L L'. So nothing is larger than features, and the effort grows linearly with the number of movements.
+    """
+    numbers = np.unique(groups, return_inverse=True)[1].reshape(-1)
+    order = np.argsort(numbers, kind="stable")
+    begins = np.searchsorted(numbers[order], np.arange(numbers.max() + 1))
+    uncertainty = np.linalg.inv(features.T @ features + penalty)
+    half = np.linalg.cholesky(0.5 * (uncertainty + uncertainty.T))
+    rows = features @ half
+    squares = np.add.reduceat((rows[:, :, None] * rows[:, None, :])[order], begins, axis=0)
+    values, vectors = np.linalg.eigh(squares)
+    left = 1.0 - values
+    clipped = np.maximum(left, minimum)
+    added = np.where(values > 1e-12, (clipped**-power - 1.0) / np.maximum(values, 1e-12), power)
+    residuals: Floats = y - rows @ (rows.T @ y)
+    gains = vectors @ (added[:, :, None] * np.swapaxes(vectors, 1, 2))
+    for own, gain in zip(np.split(order, begins[1:]), gains, strict=True):
+        residuals[own] += rows[own] @ (gain @ (rows[own].T @ residuals[own]))
+    return residuals, float(len(y) - (1.0 - np.clip(left / minimum, 0.0, 1.0)).sum())
 
 
 def chosen_ridge(y: Floats, features: Floats, degrees: Ints, groups: Ints, relative: bool = True) -> tuple[float, ...]:

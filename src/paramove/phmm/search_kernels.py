@@ -10,7 +10,7 @@ import numpy as np
 
 from paramove.documents import Floats, Ints
 from paramove.hmm import add_multiple, compiled, compiled_sums, dot, filled, segments_log_likelihood, stacked_segments
-from paramove.phmm.features import monomials_at
+from paramove.phmm.features import features_at, monomials_at
 
 NEGLIGIBLE = 1e-15  # of a responsibility
 WIDTH = 1e-5
@@ -266,22 +266,22 @@ def information_at(u: Floats, gradient: Floats, movement: Movement) -> Floats:
 
 @compiled
 def nearest(
-    starts: Floats, bound: float, exponents: Ints, right: Floats, triangle: Floats, max_steps: int
+    starts: Floats, bound: float, exponents: Ints, units: Floats, right: Floats, triangle: Floats, max_steps: int
 ) -> tuple[Floats, Floats]:
     """The u within +-bound with the minimum |right - triangle phi(u)|^2, and triangle dphi/du there.
 
     Gauss-Newton with shorter steps where a full one increases it, from the best of the starts (S, P).
     """
-    n_features, n_components = exponents.shape
+    n_features, n_components = len(exponents) + len(units), exponents.shape[1]
     features, slopes = np.empty(n_features), np.empty((n_features, n_components))
     u, misfit = starts[0].copy(), np.inf
     for s in range(len(starts)):
-        monomials_at(starts[s], exponents, features, slopes)
+        features_at(starts[s], exponents, units, features, slopes)
         start_misfit = ((right - triangle @ features) ** 2).sum()
         if start_misfit < misfit:
             u, misfit = starts[s].copy(), start_misfit
     for _ in range(max_steps):
-        monomials_at(u, exponents, features, slopes)
+        features_at(u, exponents, units, features, slopes)
         moved = triangle @ slopes
         matrix = moved.T @ moved
         matrix += 1e-9 * (np.trace(matrix) + 1e-300) * np.eye(n_components)
@@ -289,7 +289,7 @@ def nearest(
         fraction, gained = 1.0, -1.0
         for _ in range(5):
             candidate = np.minimum(np.maximum(u + fraction * step, -bound), bound)
-            monomials_at(candidate, exponents, features, slopes)
+            features_at(candidate, exponents, units, features, slopes)
             gained = misfit - ((right - triangle @ features) ** 2).sum()
             if gained > 0.0:
                 break
@@ -299,38 +299,5 @@ def nearest(
         u, misfit = candidate, misfit - gained
         if gained < 1e-9 * (1.0 + misfit):
             break
-    monomials_at(u, exponents, features, slopes)
+    features_at(u, exponents, units, features, slopes)
     return u, triangle @ slopes
-
-
-@compiled
-def aligned_parts(
-    sequence: Floats, movement: Movement, begins: Ints, alignments: int, starts: Floats, bound: float,
-    projector: Floats, triangle: Floats, max_steps: int,
-) -> Floats:  # fmt: skip
-    """Averages of the parts of a movement and its last frame, ((parts + 1) D,).
-
-    States are aligned at the first of the starts, and then at the theta that follows from the averages.
-
-    Args:
-        sequence: the frames, (T, D). begins: first state of each part. alignments: number of alignments.
-        starts, bound, triangle, max_steps: of `nearest`; projector: maps the averages to its `right`.
-    """
-    parts, u = np.empty((len(begins) + 1, sequence.shape[1])), starts[0]
-    parts[-1] = sequence[-1]
-    for alignment in range(alignments):
-        if alignment > 0:
-            right = np.dot(projector, parts.ravel())
-            u = nearest(starts, bound, movement.exponents, right, triangle, max_steps)[0]
-        gamma = responsibilities_at(u, movement)
-        parts[:-1] = 0.0
-        for part in range(len(begins)):
-            end = begins[part + 1] if part + 1 < len(begins) else len(gamma)
-            weight = 0.0
-            for i in range(begins[part], end):
-                for t in range(movement.ends[i, 0], movement.ends[i + 1, 1]):
-                    if gamma[i, t] > NEGLIGIBLE:
-                        weight += gamma[i, t]
-                        add_multiple(gamma[i, t], sequence[t], parts[part])
-            parts[part] /= weight
-    return parts.ravel()

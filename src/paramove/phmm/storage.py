@@ -13,7 +13,7 @@ from paramove.documents import Floats, InputError, read_arrays, replacing
 from paramove.hmm import TrainingOptions, TrainingSummary
 from paramove.phmm.description import MovementDescription
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 MAX_BYTES = 256 * 2**20
 """Of all arrays together; the reaching model of 8 local models has 8 MB."""
 MAX_ARRAYS = 500

@@ -154,28 +154,6 @@ def test_more_units_must_be_better_in_nearly_all_folds(gains: tuple[float, ...],
     assert _better(errors, known, more=False)
 
 
-def test_slopes_of_parts_equal_finite_differences() -> None:
-    sequences, theta = shown(2)
-    model = NeuralPHMM(8, 4, 6, n_hidden=2, options=TrainingOptions(max_iterations=5)).fit(sequences, theta)
-    weights, place = np.full(8, 5.0), np.array([0.1, -0.3])
-    observed = np.zeros(len(model.performances_.root))
-    slopes = model._missed(observed, weights, place)[1]
-    for p, unit in enumerate(np.eye(2)):
-        above, below = (model._missed(observed, weights, place + 1e-5 * sign * unit)[0] for sign in (1, -1))
-        assert_allclose(slopes[:, p], (below - above) / 2e-5, rtol=1e-5, atol=1e-7)
-
-
-def test_nearest_theta_is_the_minimum_and_where_the_networks_say_so() -> None:
-    """Of parts that the networks make themselves, theta is found exactly."""
-    sequences, theta = shown(2)
-    model = NeuralPHMM(8, 4, 6, n_hidden=1, options=TrainingOptions(max_iterations=5)).fit(sequences, theta)
-    weights, place = np.full(8, 5.0), np.array([0.4, -0.2])
-    observed = -model._missed(np.zeros(len(model.performances_.root)), weights, place)[0]
-    found, covariance = model.performances_.nearest(np.zeros(2), 1.5, lambda at: model._missed(observed, weights, at))
-    assert_allclose(found, place, rtol=0.0, atol=1e-4)
-    assert (np.linalg.eigvalsh(covariance) > 0.0).all()
-
-
 def test_restarts_are_drawn_from_the_seed() -> None:
     sequences, theta = shown(2)
 

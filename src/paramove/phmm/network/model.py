@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,32 +13,27 @@ from paramove.hmm import (
     LeftRightHMM,
     Parameters,
     TrainingOptions,
-    check_length,
-    checked_sequence,
     equal_segments,
 )
 from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
+from paramove.phmm.examining import ExaminingPHMM
 from paramove.phmm.features import Monomials
 from paramove.phmm.local_models import check_local_models
 from paramove.phmm.network.choice import chosen_units, with_decay
 from paramove.phmm.network.networks import StateNetworks
-from paramove.phmm.network.performance import NetworkPerformances, StateAverages, parts_of
 from paramove.phmm.network.training import NetworkParameters, NetworkPrior, SequenceMoments, train_networks
-from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
-from paramove.phmm.performance import state_averages
+from paramove.phmm.noise import AddedNoise
+from paramove.phmm.parametric import TrainingData
+from paramove.phmm.performance import Performances
 from paramove.phmm.regression import RegressedParameters, train_regressed
 from paramove.phmm.ridge import chosen_ridge
 
 SMOOTHNESS = 0.05
 """Of the polynomial model whose alignment of frames and states the networks begin with."""
-MAX_STARTS = 32
-CLIMBED = 3
-MAX_STEPS, TOLERANCE = 40, 1e-6
-REALIGNMENTS = 2
 
 
-class NeuralPHMM(ParametricHMM):
+class NeuralPHMM(ExaminingPHMM):
     """Means mu_i = Z_i phi(theta) + W2_i sigma(W1_i theta + b1_i); covariances do not depend on theta.
 
     The polynomial Z_i phi(theta), added to the network of (3.5), models the nearly linear part; the network learns the
@@ -126,7 +119,8 @@ class NeuralPHMM(ParametricHMM):
             begin, prior, data.sequences, positions, features, options, self.gradient_steps
         )
         self._set_learned(monomials, trained.networks, trained.covariances, trained.durations)
-        self.performances_ = self._performances(data, positions, features, prior.ridge)
+        units = replace(monomials, units=trained.networks.inner[-1])  # of the last state, where theta shows most
+        self.performances_ = Performances.fitted(data.recorded, data.theta, units, data.groups)
 
     def _aligned(self, data: TrainingData, options: TrainingOptions) -> tuple[RegressedParameters, Monomials]:
         """A polynomial model that aligns frames and states."""
@@ -138,16 +132,6 @@ class NeuralPHMM(ParametricHMM):
         features = monomials.at(data.theta)
         trained, _ = train_regressed(initial, data.sequences, features, monomials.degrees, options, SMOOTHNESS)
         return trained, monomials
-
-    def _performances(
-        self, data: TrainingData, positions: Floats, features: Floats, ridge: Floats
-    ) -> NetworkPerformances:
-        learned = NetworkParameters(self.networks_, self.covariances_, self.durations_, self.d_min)
-        moments = SequenceMoments.gathered(learned, data.sequences, self.networks_.means(positions, features))
-        jacobians = np.stack([self._jacobian(position) for position in positions])
-        averages = np.concatenate([moments.averages, [sequence[-1:] for sequence in data.sequences]], axis=1)
-        observed = StateAverages(positions, features, jacobians, averages, moments.weights, ridge, data.groups)
-        return NetworkPerformances.fitted(observed, self.networks_.inner)
 
     def _set_learned(
         self, monomials: Monomials, networks: StateNetworks, covariances: Floats, durations: Floats
@@ -179,75 +163,12 @@ class NeuralPHMM(ParametricHMM):
         value, gradient, _ = self._expectation(self._scaled(self._checked_theta(theta)), self._prepared(checked))
         return value, gradient / self.monomials_.scale
 
-    def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
-        """Theta of a complete movement and its covariance.
+    def _log_likelihood_at(self, checked: Floats, theta: Floats) -> float:
+        return self._value(self._scaled(theta), self._prepared(checked))
 
-        Maximum likelihood by generalised EM from several starts (thesis 3.3.2.2) aligns the states; theta then follows
-        from their averages, by the distribution of whole training executions about their means.
-
-        Raises ValueError for `finished=False`: networks of complete movements do not model beginnings.
-        """
-        if not finished:
-            raise ValueError("a NeuralPHMM estimates theta of complete movements; a QuadraticPHMM also of beginnings")
-        checked = self._checked(sequence)
-        prepared = self._prepared(checked)
-        starts = self._starts()
-        values = [self._value(start, prepared) for start in starts]
-        reached = [self._climbed(starts[number], prepared) for number in np.argsort(values)[: -CLIMBED - 1 : -1]]
-        likeliest = max(reached, key=lambda one: one[1])[0]
-        best, covariance = self._refined(likeliest, checked)
-        scale = self.monomials_.scale
-        theta = self.monomials_.centre + scale * best
-        return ParameterEstimate(theta, covariance * np.outer(scale, scale), self._value(best, prepared))
-
-    def _refined(self, position: Floats, checked: Floats) -> tuple[Floats, Floats]:
-        """Scaled theta from the distribution of whole executions, starting from the likeliest, and its covariance."""
-        for _ in range(REALIGNMENTS):
-            evaluator = replace(self._common(), means=self._means_and_slopes(position)[0])
-            averages, weights = state_averages(evaluator.expectation(checked)[1].T, checked)
-            observed = parts_of(np.concatenate([averages, checked[-1:]]), weights)
-            missed = partial(self._missed, observed, weights)
-            position, covariance = self.performances_.nearest(position, self._widest, missed)
-        return position, covariance
-
-    def _missed(self, observed: Floats, weights: Floats, position: Floats) -> tuple[Floats, Floats]:
-        """Parts of a movement (n,) minus those of the networks at a position, and the slopes of the latter (n, P)."""
-        last, jacobian = self.performances_.last, self._jacobian(position)
-        means, slopes = self._means_and_slopes(position)
-        end = last.means(position[None], self._features(position)[None])[0]
-        slopes = np.concatenate([slopes, last.slopes(position, jacobian)])
-        wide = np.stack([parts_of(one, weights) for one in np.moveaxis(slopes, 2, 0)], axis=1)
-        return observed - parts_of(np.concatenate([means, end]), weights), wide
-
-    @property
-    def _widest(self) -> float:
-        return 1.0 + 2.0 * self.search_margin
-
-    def _starts(self) -> Floats:
-        """A grid over the bounds of the training, finer where theta has few components. Shape (S, P)."""
-        dimension = len(self.monomials_.centre)
-        lines = max(2, int(MAX_STARTS ** (1.0 / dimension) + 1e-9))
-        line = np.linspace(-1.0, 1.0, 2 * lines + 1)[1::2]
-        return np.array(list(itertools.product(line, repeat=dimension)) if dimension < 6 else [np.zeros(dimension)])
-
-    def _climbed(self, position: Floats, prepared: search_kernels.Movement) -> tuple[Floats, float]:
-        """Gauss-Newton steps with exact gradients, shortened while the likelihood would fall, within the bounds."""
-        bounds = np.full(len(position), self._widest)
-        value, gradient, information = self._expectation(position, prepared)
-        for _ in range(MAX_STEPS):
-            step = search_kernels.bounded_step(position, gradient, information, -bounds, bounds)
-            for fraction in 0.4 ** np.arange(8):
-                candidate = np.clip(position + fraction * step, -bounds, bounds)
-                candidate_result = self._expectation(candidate, prepared)
-                if candidate_result[0] >= value:
-                    break
-            else:
-                break
-            gain, position = candidate_result[0] - value, candidate
-            value, gradient, information = candidate_result
-            if gain < TOLERANCE:
-                break
-        return position, value
+    def _expect(self, noise: AddedNoise) -> None:
+        super()._expect(noise)
+        self._evaluator = None
 
     def _expectation(self, position: Floats, prepared: search_kernels.Movement) -> tuple[float, Floats, Floats]:
         """ln p, its gradient and the information of the means in scaled theta, at one position.
@@ -297,24 +218,6 @@ class NeuralPHMM(ParametricHMM):
             self._evaluator = Evaluator.of(self.at(self.monomials_.centre).parameters)
         return self._evaluator
 
-    def _checked(self, sequence: ArrayLike) -> Floats:
-        self._check_trained()
-        checked = self._resampled(checked_sequence(sequence, self.covariances_.shape[-1]))
-        check_length(len(checked), self.n_states, self.d_min, self.d_max)
-        return checked
-
-    def _checked_theta(self, theta: ArrayLike) -> Floats:
-        self._check_trained()
-        values = np.asarray(theta, dtype=np.float64)
-        n_components = len(self.monomials_.centre)
-        if values.shape[-1:] != (n_components,) or values.ndim > 2 or not np.isfinite(values).all():
-            raise ValueError(f"theta has {n_components} finite components, found shape {values.shape}: {values}")
-        return values
-
-    def _check_trained(self) -> None:
-        if not hasattr(self, "networks_"):
-            raise RuntimeError("this model is not trained yet: call fit, or load a file")
-
     def _scaled(self, theta: Floats) -> Floats:
         result: Floats = (theta - self.monomials_.centre) / self.monomials_.scale
         return result
@@ -328,7 +231,7 @@ class NeuralPHMM(ParametricHMM):
             "durations": self.durations_,
             "theta_centre": self.monomials_.centre,
             "theta_scale": self.monomials_.scale,
-            **self.performances_.arrays(),
+            **(self.performances_.arrays() if self.performances_ is not None else {}),
         }
 
     def _set_arrays(self, arrays: dict[str, Floats]) -> None:
@@ -345,7 +248,8 @@ class NeuralPHMM(ParametricHMM):
         local = (networks.skip[None, ..., 0], arrays["covariances"][None], arrays["durations"][None])
         check_local_models(*local, self.d_min)
         self._set_learned(monomials, networks, arrays["covariances"], arrays["durations"])
-        self.performances_ = NetworkPerformances.from_arrays(arrays, networks)
+        units = replace(monomials, units=networks.inner[-1])
+        self.performances_ = Performances.from_arrays(arrays, units)
 
 
 def _monomials(degree: int, theta: Floats) -> Monomials:

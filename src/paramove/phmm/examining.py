@@ -1,0 +1,135 @@
+"""Models that know how whole executions vary: theta with an honest region, outlier score and p-value."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from paramove.documents import Floats, renamed_attribute
+from paramove.hmm import check_length, checked_sequence
+from paramove.phmm.features import Monomials
+from paramove.phmm.noise import AddedNoise
+from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
+from paramove.phmm.performance import Performances, beginning_features, movement_parts
+
+
+class Examination(NamedTuple):
+    """A sequence examined by one model.
+
+    Attributes:
+        estimate: of theta.
+        outlier_score: distance from the training movements, see `Performances.outlier_score`; of a beginning the
+            root of its distance in units of the median one.
+        log_density: of `movement_parts`, or of the features of a beginning.
+        log_p_value: logarithm of `p_value`.
+    """
+
+    estimate: ParameterEstimate
+    outlier_score: float
+    log_density: float
+    log_p_value: float
+
+    @property
+    def p_value(self) -> float:
+        """Probability that a genuine movement has at least this outlier score; a small one is a reason to reject."""
+        return float(np.exp(self.log_p_value))
+
+
+for _old, _new in (("strangeness", "outlier_score"), ("typicality", "p_value"), ("log_typicality", "log_p_value")):
+    setattr(Examination, _old, renamed_attribute(_old, _new))
+
+
+class ExaminingPHMM(ParametricHMM):
+    """Estimates theta by generalised least squares of whole executions, complete or just begun.
+
+    Attributes:
+        monomials_: features of theta.
+        covariances_: shape (N, D, D).
+        performances_: distribution of whole executions; None with independent residuals.
+        search_margin: how far outside the training's bounds `estimate` searches, as a fraction of their width.
+    """
+
+    monomials_: Monomials
+    covariances_: Floats
+    performances_: Performances | None = None
+    search_margin: float
+
+    @abstractmethod
+    def _log_likelihood_at(self, checked: Floats, theta: Floats) -> float:
+        """ln p(X | lambda^theta) of a sequence as the HMM takes it."""
+
+    def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
+        """The most likely theta, its covariance, and the log-likelihood there, of a movement or of its beginning.
+
+        Theta follows from `movement_parts` by generalised least squares. A beginning (`finished=False`) has the frame
+        rate of the training; its log-likelihood is that of `beginning_features`.
+        """
+        if not finished:
+            return self.examine(sequence, finished=False).estimate
+        self._check_trained()
+        recorded = checked_sequence(sequence, self.covariances_.shape[-1])
+        model = self._expecting_noise_of(recorded)
+        assert model.performances_ is not None
+        return model._estimated(recorded, model.performances_)[0]
+
+    def examine(self, sequence: ArrayLike, *, finished: bool = True) -> Examination:
+        """Estimate of theta, outlier score and p-value of the sequence.
+
+        Raises ValueError for a model with independent residuals, which has no distribution of executions, and for a
+        beginning of fewer frames than are modelled.
+        """
+        self._check_trained()
+        if self.performances_ is None:
+            raise ValueError("this model has independent residuals: train it with residuals='correlated'")
+        recorded = checked_sequence(sequence, self.covariances_.shape[-1])
+        model = self._expecting_noise_of(recorded)
+        if model is not self:
+            return model.examine(recorded, finished=finished)
+        if not finished:
+            n_frames, regression = self.performances_.beginning(len(recorded))
+            features = beginning_features(recorded, n_frames)
+            theta, covariance = regression.estimate(features, self.search_margin)
+            distance = regression.distance(features, theta)
+            density = regression.log_density(distance)
+            outlier_score = float(np.sqrt(distance / (np.median(regression.distances) + 1e-9)))
+            estimate = ParameterEstimate(theta, covariance, density)
+            return Examination(estimate, outlier_score, density, regression.log_p_value(distance))
+        estimate, parts = self._estimated(recorded, self.performances_)
+        nearest = self.performances_.complete.estimate(parts, self.search_margin)[0]
+        distance = self.performances_.complete.distance(parts, nearest)
+        outlier_score = self.performances_.outlier_score(distance, self.performances_.pace.distance(recorded))
+        density = self.performances_.complete.log_density(distance)
+        return Examination(estimate, outlier_score, density, self.performances_.log_p_value(outlier_score))
+
+    def _estimated(self, recorded: Floats, performances: Performances) -> tuple[ParameterEstimate, Floats]:
+        """Estimate from the distribution of whole executions, and the description of this one."""
+        checked = self._checked(recorded)
+        parts = movement_parts(recorded)
+        theta, covariance = performances.estimate(parts, self.search_margin)
+        return ParameterEstimate(theta, covariance, self._log_likelihood_at(checked, theta)), parts
+
+    def _expect(self, noise: AddedNoise) -> None:
+        self.covariances_ = self.covariances_ + noise.of_states
+        if self.performances_ is not None:
+            self.performances_ = self.performances_.expecting(noise)
+
+    def _checked(self, sequence: ArrayLike) -> Floats:
+        self._check_trained()
+        checked = self._resampled(checked_sequence(sequence, self.covariances_.shape[-1]))
+        check_length(len(checked), self.n_states, self.d_min, self.d_max)
+        return checked
+
+    def _checked_theta(self, theta: ArrayLike) -> Floats:
+        self._check_trained()
+        values = np.asarray(theta, dtype=np.float64)
+        n_components = len(self.monomials_.centre)
+        if values.shape[-1:] != (n_components,) or values.ndim > 2 or not np.isfinite(values).all():
+            raise ValueError(f"theta has {n_components} finite components, found shape {values.shape}: {values}")
+        return values
+
+    def _check_trained(self) -> None:
+        if not hasattr(self, "monomials_"):
+            raise RuntimeError("this model is not trained yet: call fit, or load a file")
