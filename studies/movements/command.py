@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 FOLDER = Path("runs/evaluation")
 TABLE_COLUMNS = (
-    *("dtw", "end", "theta", "theta_p95", "covered", "auroc_aborted", "auroc_stopped"),
+    *("dtw", "end", "theta", "covered_50", "covered", "covered_set", "below_1", "auroc_aborted", "auroc_stopped"),
     *("correct", "correct_25", "correct_50", "correct_75", "correct_100"),
 )
 
@@ -33,6 +33,7 @@ class Scope(StrEnum):
 
     RASTER = "raster"
     REAL = "real"
+    FEW = "few"
     ALL = "all"
 
 
@@ -75,7 +76,9 @@ def real(
 
 
 def peers(
-    on: Annotated[Scope, typer.Option(help="synthetic demonstrator, recorded people, or both")] = Scope.ALL,
+    on: Annotated[
+        Scope, typer.Option(help="synthetic demonstrator, recorded people, few or tidy synthetic movements, or all")
+    ] = Scope.ALL,
     data: DataOption = None,
     out: OutOption = None,
     json_file: JsonFileOption = None,
@@ -119,14 +122,16 @@ def _chosen(rows: Sequence[Row], methods: list[str] | None) -> list[Row]:
 
 def _tasks(on: Scope, data: Path | None, names: list[str] | None) -> dict[str, list[Fold]]:
     from paramove.demonstrations import RecordingsError
-    from studies.movements.tasks import grid_tasks, real_tasks
+    from studies.movements.tasks import few_tasks, grid_tasks, real_tasks
 
     folds: dict[str, list[Fold]] = {}
     try:
-        if on is not Scope.RASTER:
+        if on in (Scope.REAL, Scope.ALL):
             folds |= real_tasks(data)
-        if on is not Scope.REAL:
+        if on in (Scope.RASTER, Scope.ALL):
             folds |= grid_tasks()
+        if on in (Scope.FEW, Scope.ALL):
+            folds |= few_tasks()
     except RecordingsError as error:
         print_error(str(error))
         raise typer.Exit(exit_codes.INPUT_MISSING) from error

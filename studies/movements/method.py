@@ -18,10 +18,11 @@ FRAMES = 100
 
 
 class Estimate(NamedTuple):
-    """Theta (P,) and its covariance (P, P); None from methods without one."""
+    """Theta (P,), its covariance (P, P) and the movement's p-value; None from methods without one."""
 
     theta: Floats
     covariance: Floats | None
+    p_value: float | None = None
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,9 @@ class Models(NotAble):
 
     def estimate(self, x: Floats) -> Estimate:
         """The likeliest theta and its covariance."""
+        if BEGINNINGS in self.can and isinstance(self.model, PolynomialPHMM):
+            examined = self.model.examine(x)
+            return Estimate(examined.estimate.theta, examined.estimate.covariance, examined.p_value)
         estimate = self.model.estimate(x)
         return Estimate(estimate.theta, estimate.covariance)
 

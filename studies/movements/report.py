@@ -13,7 +13,7 @@ from studies.movements import plots
 from studies.movements.summary import QUANTITIES, SECONDS, Measured, Quantity
 from studies.movements.tasks import FIRST_MS
 
-THETA_UNITS = {"pointing": "°", "table": "cm", "raster": "cm"}
+THETA_UNITS = {"pointing": "°", "table": "cm", "raster": "cm", "scripted": "cm"}
 TEXTS = {
     "pointing/direction": "Pointing, one target left out: per person, all directions but one are learned.",
     "pointing/corners": "Pointing, learned from the corners: per person, the four corner directions of all depths are "
@@ -29,6 +29,8 @@ TEXTS = {
     "raster/actions": "Kinds of movement of the synthetic demonstrator; finished movements.",
     "raster/beginnings": "Kinds of movement of the synthetic demonstrator while they go on.",
 }
+NOMINAL = {"covered_50": 50.0, "covered_80": 80.0, "covered": 95.0, "below_1": 1.0, "below_5": 5.0, "below_20": 20.0}
+"""Percentages that are right, so neither more nor less is better."""
 SECOND_HEADINGS = {
     "fit": "learn, s",
     "synthesize": "synthesise, ms",
@@ -133,8 +135,8 @@ def leading(rows: dict[str, dict[str, Any]], quantity: Quantity) -> set[str]:
     }
     if not measured:
         return set()
-    if quantity.name == "covered":
-        return {name for name, one in measured.items() if one.low <= 95.0 <= one.high}
+    if quantity.name in NOMINAL:
+        return {name for name, one in measured.items() if one.low <= NOMINAL[quantity.name] <= one.high}
     if quantity.more_is_better:
         best = max(measured.values(), key=lambda one: one.value)
         return {name for name, one in measured.items() if one.value >= best.low}

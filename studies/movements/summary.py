@@ -41,6 +41,10 @@ def _percent(values: Floats) -> float:
     return float(100.0 * values.mean())
 
 
+def _smallest_percent(values: Floats) -> float:
+    return float(100.0 * values.min())
+
+
 def _p95(values: Floats) -> float:
     return float(np.percentile(values, 95.0))
 
@@ -58,7 +62,13 @@ QUANTITIES = (
     Quantity("theta", "θ error, mean", "θ", False, ("theta",), _mean),
     Quantity("theta_median", "θ error, median", "θ", False, ("theta",), _median),
     Quantity("theta_p95", "θ error, 95 %", "θ", False, ("theta",), _p95),
+    Quantity("covered_50", "50 % region covers", "%", True, ("covered_50",), _percent),
+    Quantity("covered_80", "80 % region covers", "%", True, ("covered_80",), _percent),
     Quantity("covered", "95 % region covers", "%", True, ("covered",), _percent),
+    Quantity("covered_set", "95 % region covers, worst fold", "%", True, ("covered_set",), _smallest_percent),
+    Quantity("below_1", "genuine with p < 1 %", "%", False, ("below_1",), _percent),
+    Quantity("below_5", "genuine with p < 5 %", "%", False, ("below_5",), _percent),
+    Quantity("below_20", "genuine with p < 20 %", "%", False, ("below_20",), _percent),
     Quantity("correct", "right action", "%", True, ("correct",), _percent),
     *(
         Quantity(f"correct_{percent}", f"right after {percent} %", "%", True, (f"correct_{percent}",), _percent)

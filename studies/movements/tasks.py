@@ -5,12 +5,17 @@ A fold leaves out a whole direction, person or grid, never single repetitions at
 - `pointing/direction`: per person, one of the targets is left out.
 - `pointing/corners`: per person, trained on the targets in the corners of the grid, those of all depths together,
   tested on all others.
+- `pointing/four corners`: the same per depth: four directions are learned, all others of that depth tested.
+- `pointing/planes`: per person, the middle column or the middle row of the targets is left out.
 - `table/<action>`: one person is left out; both hands together. Drinking counts up to the grasp.
+- `table/<action>, 5 persons`: five drawn persons are learned, each of the others is tested.
 - `table/actions`: the kinds of movement, one person left out; whole movements.
 - `table/beginnings`: the same while they go on, all cut at their beginning by one absolute rule.
 - `table/first 100 ms` and more: the same, every movement is cut after that time.
 - `raster/<action>`, `raster/actions`, `raster/beginnings`: the synthetic demonstrator; 3 x 3 targets 10 times against
   7 x 5 targets 4 times; a fold is a seed.
+- `scripted/same`, `scripted/3 mm`: minimum-jerk movements of a point to 3 x 3 targets, 4 times with 1 mm of noise; the
+  latter with ends that vary by 3 mm. `raster/2 repetitions`, 5, 20: the demonstrator's reaching. Each fold is a set.
 """
 
 from __future__ import annotations
@@ -31,6 +36,7 @@ from paramove.demonstrations import (
     data_folder,
     demonstrations_at,
     load_recordings,
+    minimum_jerk,
     table_targets,
 )
 from paramove.documents import Floats
@@ -40,6 +46,11 @@ from studies.movements.per_action import first_frames
 
 GRID_ACTIONS = ("reaching", "pointing")
 FIRST_MS = (100, 200, 400)
+FEW_PERSONS, DRAWS = 5, 2
+REPETITIONS = (2, 5, 20)
+SCRIPTED = {"same": 0.0, "3 mm": 0.003}
+"""Standard deviation of where scripted movements begin and end, m."""
+SCRIPTED_NOISE_M, SCRIPTED_FRAMES = 0.001, 100
 
 
 @dataclass(frozen=True)
@@ -83,6 +94,7 @@ def real_tasks(folder: Path | None = None) -> dict[str, list[Fold]]:
     if "pointing27" in present:
         pointing = load_recordings("pointing27", root)
         tasks |= {"pointing/direction": _directions(pointing), "pointing/corners": _corners(pointing)}
+        tasks |= {"pointing/four corners": _four_corners(pointing), "pointing/planes": _planes(pointing)}
     if "table_reach" in present:
         tasks |= _table_tasks(load_recordings("table_reach", root))
     return {name: folds for name, folds in tasks.items() if folds}
@@ -91,6 +103,7 @@ def real_tasks(folder: Path | None = None) -> dict[str, list[Fold]]:
 def _table_tasks(table: Recordings) -> dict[str, list[Fold]]:
     with_target = [action for action in table.actions if np.isfinite(_targets(table.of(action=action))).all()]
     tasks = {f"table/{action}": _persons(table, action) for action in with_target}
+    tasks |= {f"table/{action}, {FEW_PERSONS} persons": _few_persons(table, action) for action in with_target}
     if len(table.actions) > 1:
         tasks["table/actions"] = _kinds(table, "table/actions", _WHOLE)
         tasks["table/beginnings"] = _kinds(table, "table/beginnings", _FROM_ONSET, beginnings=True)
@@ -117,6 +130,42 @@ def grid_tasks(seeds: Sequence[int] = (0, 1, 2, 3, 4)) -> dict[str, list[Fold]]:
     return tasks
 
 
+def few_tasks(seeds: Sequence[int] = tuple(range(20))) -> dict[str, list[Fold]]:
+    """Few or tidy demonstrations, of synthetic movements, by name."""
+    tasks = {
+        f"scripted/{name}": [
+            Fold(f"scripted/{name}", str(seed), *_scripted(deviation, seed), [], "place", 0) for seed in seeds
+        ]
+        for name, deviation in SCRIPTED.items()
+    }
+    for repetitions in REPETITIONS:
+        name = f"raster/{repetitions} repetitions"
+        tasks[name] = [
+            Fold(name, str(seed), _grid("reaching", 3, 3, repetitions, [seed, 2]),
+                 _grid("reaching", 7, 5, 2, [seed, 3]), [], "raster", 5)
+            for seed in seeds
+        ]  # fmt: skip
+    return tasks
+
+
+def _scripted(deviation: float, seed: int) -> tuple[Examples, Examples]:
+    """Training and test of movements along a line to targets of a table, as a script or a robot makes them."""
+    rng = np.random.default_rng([seed, 4])
+
+    def to(targets: Floats, repetitions: int) -> Examples:
+        theta = np.repeat(targets[:, :2], repetitions, axis=0)
+        progress = minimum_jerk(np.linspace(0.0, 1.0, SCRIPTED_FRAMES), 0.0, 1.0)[:, None]
+        sequences = []
+        for target in np.repeat(targets, repetitions, axis=0):
+            begin, end = deviation * rng.standard_normal((2, 3))
+            noise = SCRIPTED_NOISE_M * rng.standard_normal((SCRIPTED_FRAMES, 3))
+            sequences.append(begin + progress * (target + end - begin) + noise)
+        groups = np.repeat(np.arange(len(targets)), repetitions)
+        return Examples(sequences, theta, ["scripted"] * len(theta), groups, SAMPLE_RATE_HZ)
+
+    return to(table_targets(3, 3)[0], 4), to(table_targets(7, 5)[0], 4)
+
+
 def _directions(pointing: Recordings) -> list[Fold]:
     folds = []
     for subject in pointing.subjects:
@@ -139,6 +188,46 @@ def _corners(pointing: Recordings) -> list[Fold]:
         if train and test:
             folds.append(_pointing_fold("pointing/corners", str(subject), pointing, train, test))
     return folds
+
+
+def _four_corners(pointing: Recordings) -> list[Fold]:
+    folds = []
+    for subject in pointing.subjects:
+        own = pointing.of(subject=subject)
+        positions = {one.target_id: one.target for one in own}
+        corners = corner_targets(positions)
+        depths = np.array([positions[number][0] for number in sorted(corners)])
+        for depth in _levels(depths):
+            level = [one for one in own if abs(one.target[0] - depth) <= 0.15 * np.ptp(depths)]
+            train = [one for one in level if one.target_id in corners]
+            test = [one for one in level if one.target_id not in corners]
+            if train and test:
+                name = f"{subject}/{depth:.2f}"
+                folds.append(_pointing_fold("pointing/four corners", name, pointing, train, test))
+    return folds
+
+
+def _planes(pointing: Recordings) -> list[Fold]:
+    folds = []
+    for subject in pointing.subjects:
+        own = pointing.of(subject=subject)
+        positions = np.array(list({one.target_id: one.target for one in own}.values()))
+        for axis, name in ((1, "column"), (2, "row")):
+            levels = _levels(positions[:, axis])
+            if len(levels) < 3:
+                continue
+            middle, width = levels[len(levels) // 2], 0.15 * np.ptp(positions[:, axis])
+            train = [one for one in own if abs(one.target[axis] - middle) >= width]
+            test = [one for one in own if abs(one.target[axis] - middle) < width]
+            folds.append(_pointing_fold("pointing/planes", f"{subject}/{name}", pointing, train, test))
+    return folds
+
+
+def _levels(values: Floats) -> list[float]:
+    """Centres of clusters of positions that lie farther apart than a tenth of their range."""
+    ordered = np.sort(values)
+    parts = np.split(ordered, np.flatnonzero(np.diff(ordered) > 0.1 * np.ptp(values) + 1e-9) + 1)
+    return [float(part.mean()) for part in parts]
 
 
 def corner_targets(positions_by_target: dict[int, Floats]) -> set[int]:
@@ -178,6 +267,19 @@ def _persons(table: Recordings, action: str) -> list[Fold]:
         test = _table_examples([one for one in own if one.subject == subject], table.fingertip, _TO_GRASP)
         if len(train) and len(test):
             folds.append(Fold(f"table/{action}", str(subject), train, test, others, "place", table.fingertip))
+    return folds
+
+
+def _few_persons(table: Recordings, action: str) -> list[Fold]:
+    folds, name = [], f"table/{action}, {FEW_PERSONS} persons"
+    own = table.of(action=action)
+    subjects = sorted({one.subject for one in own})
+    for draw in range(DRAWS if len(subjects) > FEW_PERSONS else 0):
+        chosen = set(np.random.default_rng(draw).permutation(subjects)[:FEW_PERSONS].tolist())
+        train = _table_examples([one for one in own if one.subject in chosen], table.fingertip, _TO_GRASP)
+        for subject in set(subjects) - chosen:
+            test = _table_examples([one for one in own if one.subject == subject], table.fingertip, _TO_GRASP)
+            folds.append(Fold(name, f"{draw}/{subject}", train, test, [], "place", table.fingertip))
     return folds
 
 

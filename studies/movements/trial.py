@@ -15,6 +15,9 @@ from studies.movements.tasks import Fold
 FRACTIONS = (0.25, 0.5, 0.75, 1.0)
 """Fractions of a movement, from its onset, after which its kind is estimated."""
 
+REGIONS = {"covered_50": 0.5, "covered_80": 0.8, "covered": 0.95}
+LEVELS = {"below_1": 0.01, "below_5": 0.05, "below_20": 0.2}
+
 Numbers = dict[str, list[float]]
 
 
@@ -51,9 +54,14 @@ def _single_action(method: Method, fold: Fold, values: Numbers, seconds: dict[st
         seconds["estimate"] = (time.perf_counter() - began) / len(estimates)
         for estimate, theta in zip(estimates, fold.test.theta, strict=True):
             _add(values, {"theta": theta_error(estimate.theta, theta, fold.kind)})
-            inside = covered(estimate, theta)
-            if inside is not None:
-                _add(values, {"covered": inside})
+            for name, fraction in REGIONS.items():
+                inside = covered(estimate, theta, fraction)
+                if inside is not None:
+                    _add(values, {name: inside})
+            if estimate.p_value is not None:
+                _add(values, {name: float(estimate.p_value < level) for name, level in LEVELS.items()})
+        if "covered" in values:
+            values["covered_set"] = [float(np.mean(values["covered"]))]
     if OUTLIERS in method.can:
         rng = np.random.default_rng(0)
         tests = fold.test.sequences

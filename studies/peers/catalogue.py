@@ -15,7 +15,7 @@ from studies.peers.input_driven_hmm import InputDrivenHMM
 from studies.peers.minirocket import MiniRocket
 from studies.peers.nearest import NearestByWarping
 from studies.peers.promp import ContextualProMP
-from studies.peers.ridge import AlignedRidge
+from studies.peers.ridge import AlignedRidge, FrameRidge
 from studies.peers.tuning import Tuned
 
 Parameters = dict[str, Any]
@@ -71,6 +71,7 @@ def ridge_rows() -> list[Row]:
     candidates = grid_of(components=[4, 8, 16], degree=[1, 2])
     rest = (AlignedRidge, candidates, ("tslearn", "scikit-learn"))
     return [
+        Row("ridge from all frames", lambda seed: FrameRidge(), "", ("scikit-learn",)),
         *both("DTW + PCA + quadratic ridge, diagonal", *rest),
         *both("DTW + PCA + quadratic ridge, full covariance", *rest, covariance="full"),
         *both("PCA + quadratic ridge, full covariance", *rest, covariance="full", warped=False),

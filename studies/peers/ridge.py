@@ -13,6 +13,23 @@ from studies.peers.library import library
 from studies.peers.linear_gaussian import LinearGaussian, QuadraticFeatures
 
 ALPHAS = np.logspace(-4, 3, 15)
+FRAME_ALPHAS = np.logspace(-6, 3, 19)
+
+
+class FrameRidge(NotAble):
+    """Ridge regression from the numbers of all frames to theta: no model of the movement."""
+
+    can = frozenset({THETA})
+
+    def fit(self, examples: Examples) -> None:
+        """Learn from movements of one action."""
+        linear_model = library("sklearn.linear_model", "scikit-learn")
+        rows = np.stack([resample(x, FRAMES).ravel() for x in examples.sequences])
+        self.ridge = linear_model.RidgeCV(alphas=FRAME_ALPHAS).fit(rows, examples.theta)
+
+    def estimate(self, x: Floats) -> Estimate:
+        """What the regression gives."""
+        return Estimate(np.asarray(self.ridge.predict(resample(x, FRAMES).ravel()[None])[0]), None)
 
 
 class AlignedRidge(NotAble):

@@ -36,7 +36,8 @@ class Pace:
 
     Attributes:
         mean: of `pace_features`, shape (10,). root: triangular root of their covariance, shape (10, 10).
-        distances: squared Mahalanobis distances of training movements, their group left out. Shape (K,).
+        distances: squared Mahalanobis distances of training movements, their group left out of the mean and they
+            themselves of the covariance. Shape (K,).
         noise: variance of noise beyond that of the training that is expected of each coordinate of each frame.
     """
 
@@ -56,8 +57,10 @@ class Pace:
         moments = deviations.T @ deviations / len(deviations) + 1e-4 * np.eye(PACE_PARTS)
         moments += PACE_SHRINKAGE * (np.diag(np.diagonal(moments)) - moments)
         root: Floats = np.linalg.cholesky(moments)
-        white = np.linalg.solve(root, deviations.T)
-        return cls(features.mean(axis=0), root, (white**2).sum(axis=0))
+        within = (np.linalg.solve(root, deviations.T) ** 2).sum(axis=0)
+        own = (1.0 - PACE_SHRINKAGE) / len(features) * within  # what the movement itself added to the covariance
+        distances = (1.0 - 1.0 / len(features)) * within / np.maximum(1.0 - own, 0.1)
+        return cls(features.mean(axis=0), root, distances)
 
     def expecting(self, noise: float, sequence: Floats) -> Pace:
         """The same for a sequence with noise of that variance on each coordinate of each frame."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paramove.demonstrations.recorded_people import RecordingsError
-from studies.movements.tasks import Fold, corner_targets, grid_tasks, real_tasks
+from studies.movements.tasks import Fold, corner_targets, few_tasks, grid_tasks, real_tasks
 from tests.demonstrations.synthetic_recordings import write_table
 
 
@@ -13,6 +13,8 @@ def test_all_tasks_follow_from_the_folder(tasks: dict[str, list[Fold]]) -> None:
     assert {name: len(folds) for name, folds in tasks.items()} == {
         "pointing/direction": 2 * 9,
         "pointing/corners": 2,
+        "pointing/four corners": 2,
+        "pointing/planes": 2 * 2,
         "table/across": 3,
         "table/forward": 3,
         "table/actions": 3,
@@ -29,6 +31,31 @@ def test_what_is_tested_is_not_trained(tasks: dict[str, list[Fold]]) -> None:
             trained = {x.tobytes() for x in fold.train.sequences}
             assert not trained & {x.tobytes() for x in fold.test.sequences}
             assert not set(fold.train.groups) & set(fold.test.groups)
+
+
+def test_few_persons_are_drawn_and_the_others_tested(tmp_path: Path) -> None:
+    write_table(tmp_path, persons=7)
+    folds = real_tasks(tmp_path)["table/across, 5 persons"]
+    assert len(folds) == 2 * 2
+    for fold in folds:
+        assert len(set(fold.train.groups)) == 5
+        assert not set(fold.train.groups) & set(fold.test.groups)
+
+
+def test_few_and_tidy_movements_differ_between_seeds_and_repeat() -> None:
+    tasks, again = few_tasks((0, 1)), few_tasks((0,))
+    assert {name: len(folds) for name, folds in tasks.items()} == {
+        "scripted/same": 2,
+        "scripted/3 mm": 2,
+        "raster/2 repetitions": 2,
+        "raster/5 repetitions": 2,
+        "raster/20 repetitions": 2,
+    }
+    for name, (first, second) in tasks.items():
+        assert np.array_equal(first.train.sequences[0], again[name][0].train.sequences[0])
+        assert not np.array_equal(first.train.sequences[0], second.train.sequences[0])
+    ends = np.array([x[-5:].mean(axis=0) for x in tasks["scripted/same"][0].test.sequences])
+    assert np.abs(ends[:, :2] - tasks["scripted/same"][0].test.theta).max() < 0.003
 
 
 def test_every_movement_is_tested_once(tasks: dict[str, list[Fold]]) -> None:

@@ -10,7 +10,7 @@ def test_every_measure_of_one_action(tasks: dict[str, list[Fold]]) -> None:
     found = measure(MeanPath(), tasks["table/across"][0])
     values = found["values"]
     assert set(values) == {
-        "dtw", "dtw_cut", "rms", "tip_rms", "end", "theta", "covered",
+        "dtw", "dtw_cut", "rms", "tip_rms", "end", "theta", "covered", "covered_50", "covered_80", "covered_set",
         "score_genuine", "score_aborted", "score_stopped", "score_others",
     }  # fmt: skip
     assert len(values["theta"]) == 4
