@@ -34,7 +34,8 @@ def test_a_group_left_out_at_once_is_as_if_it_had_not_been_seen(seed: int, varia
     groups = np.sort(rng.integers(0, 4, 24))
     features = np.column_stack([np.ones(24), rng.standard_normal((24, 2))])
     y, penalty = rng.standard_normal((24, 5)), np.diag([0.0, 0.3, 0.7])
-    found = GroupOffsets(groups, variance).residuals(y, features, penalty)
+    offsets = GroupOffsets(groups, variance)
+    found = offsets.residuals((offsets.whitened(y), offsets.whitened(features)), penalty)
     for group in np.unique(groups):
         own, others = groups == group, groups != group
         inverse = np.linalg.inv(np.eye(others.sum()) + variance * (groups[others][:, None] == groups[others]))

@@ -25,7 +25,7 @@ from paramove.phmm.left_out import folds_of, inflation_of, one_theta_each
 from paramove.phmm.noise import distances_with_noise
 from paramove.phmm.predictive_distribution import PredictiveDistribution
 from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out, studentised_residuals
-from paramove.phmm.search_kernels import nearest
+from paramove.phmm.search_kernels import all_nearest
 
 SHRINKAGES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
 """Candidates for the fraction of each variance that counts as independent."""
@@ -100,11 +100,11 @@ class CorrelatedRegression:
             results = np.full((3, len(y)), np.nan)
             for tested, fit in folds:
                 other = fit.regression(groups[tested], ridge, shrinkage)
-                for k in tested.tolist():
-                    found, covariance = other.estimate(y[k], MARGIN)
-                    miss = found - theta[k]
-                    squared = float(miss @ np.linalg.solve(covariance, miss))
-                    results[:, k] = np.linalg.norm(miss / monomials.scale), squared, other.distance(y[k], found)
+                found, covariances = other.estimates(y[tested], MARGIN)
+                missed = found - theta[tested]
+                results[0, tested] = np.linalg.norm(missed / monomials.scale, axis=1)
+                results[1, tested] = (missed * np.linalg.solve(covariances, missed[..., None])[..., 0]).sum(axis=1)
+                results[2, tested] = other.distances_from(y[tested], found)
             return results
 
         results = left_out(folds)
@@ -119,19 +119,10 @@ class CorrelatedRegression:
         n_persons = None if one_each else len(np.unique(groups))
         inflation = inflation_of([one[np.isfinite(one)] for one in tests], theta.shape[1], n_persons)
         # Movements that no fold tested are compared with a covariance that includes them.
-        untested = np.flatnonzero(np.isnan(distances)).tolist()
-        distances[untested] = [regression.distance(y[k], theta[k]) for k in untested]
+        untested = np.isnan(distances)
+        if untested.any():
+            distances[untested] = regression.distances_from(y[untested], theta[untested])
         return replace(regression, inflation=inflation, distances=distances), error
-
-    def mean(self, theta: Floats) -> Floats:
-        """Z phi(theta). Shape (n,)."""
-        result: Floats = self.coefficients @ self.monomials.at(theta)
-        return result
-
-    def variance_at(self, theta: Floats) -> float:
-        """Factor on C for an unseen movement of theta (P,): 1 + phi' V phi."""
-        phi = self.monomials.at(theta)
-        return 1.0 + float(phi @ self.uncertainty @ phi)
 
     def estimate(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
         """Most likely theta (P,) and its widened covariance (P, P).
@@ -140,27 +131,41 @@ class CorrelatedRegression:
             y: the movement, (n,).
             margin: how far outside the bounds of the training theta may lie, as a fraction of their width.
         """
-        self._check_length(y)
-        _, projector, triangle = self._condensing
-        own, bound = self.monomials, 1.0 + 2.0 * margin
-        position, slopes = nearest(
-            own.starts, bound, own.exponents, own.logistic, projector @ y, triangle, NEWTON_STEPS
-        )
-        theta: Floats = own.centre + own.scale * position
-        information = slopes.T @ slopes / self.variance_at(theta)
-        information.flat[:: len(position) + 1] += 1.0 / bound**2
-        covariance = np.linalg.inv(information) * (self.inflation * own.scale[:, None] * own.scale)
-        return theta, covariance
+        theta, covariances = self.estimates(y[None], margin)
+        return theta[0], covariances[0]
 
     def distance(self, y: Floats, theta: Floats) -> float:
         """Squared Mahalanobis distance of a movement (n,) from that of theta (P,), plus n ln(1 + phi' V phi).
 
         With that, -2 ln of the density up to a constant: what theta far from the training allow is not likely for it.
         """
-        self._check_length(y)
-        white = self._condensing[0] @ (y - self.mean(theta))
-        factor = self.variance_at(theta)
-        return float(white @ white) / factor + len(y) * float(np.log(factor))
+        return float(self.distances_from(y[None], theta[None])[0])
+
+    def estimates(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
+        """`estimate` of many movements (K, n): theta (K, P) and covariances (K, P, P)."""
+        self._check_length(y[0])
+        _, projector, triangle = self._condensing
+        own, bound = self.monomials, 1.0 + 2.0 * margin
+        positions, slopes = all_nearest(
+            own.starts, bound, own.exponents, own.logistic, y @ projector.T, triangle, NEWTON_STEPS
+        )
+        theta: Floats = own.centre + own.scale * positions
+        information = np.swapaxes(slopes, 1, 2) @ slopes / self._variances_at(own.at(theta))[:, None, None]
+        information += np.eye(len(own.scale)) / bound**2
+        return theta, np.linalg.inv(information) * (self.inflation * own.scale[:, None] * own.scale)
+
+    def distances_from(self, y: Floats, theta: Floats) -> Floats:
+        """`distance` of many movements (K, n) from those of theta (K, P). Shape (K,)."""
+        self._check_length(y[0])
+        phi = self.monomials.at(theta)
+        white, factors = (y - phi @ self.coefficients.T) @ self._condensing[0].T, self._variances_at(phi)
+        result: Floats = (white**2).sum(axis=1) / factors + y.shape[1] * np.log(factors)
+        return result
+
+    def _variances_at(self, phi: Floats) -> Floats:
+        """Factor on C for an unseen movement with features phi (K, F): 1 + phi' V phi. Shape (K,)."""
+        result: Floats = 1.0 + ((phi @ self.uncertainty) * phi).sum(axis=1)
+        return result
 
     def widened(self, covariance: Floats) -> CorrelatedRegression:
         """With noise of that covariance (n, n) in every movement."""

@@ -43,9 +43,12 @@ class GroupOffsets:
         """Inverse of `whitened`."""
         return self._moved(rows, lambda fraction: fraction / (1.0 - fraction))
 
-    def residuals(self, y: Floats, features: Floats, penalty: Floats) -> Floats:
-        """Residual of each movement from generalised least squares without its group. Shape (K, n)."""
-        return self.restored(residuals_left_out(self.whitened(y), self.whitened(features), penalty, self.groups))
+    def residuals(self, white: tuple[Floats, Floats], penalty: Floats) -> Floats:
+        """Residual of each movement from generalised least squares without its group. Shape (K, n).
+
+        `white` are whitened values (K, n) and features (K, F).
+        """
+        return self.restored(residuals_left_out(*white, penalty, self.groups))
 
     def _moved(self, rows: Floats, factor: Callable[[float], float]) -> Floats:
         if self.variance == 0.0:
@@ -135,10 +138,11 @@ def _best_ridge(y: Floats, features: Floats, degrees: Ints, offsets: GroupOffset
     if len(np.unique(offsets.groups)) < 3:
         return ridge
     known: dict[tuple[float, ...], float] = {}
+    white = offsets.whitened(y), offsets.whitened(features)
 
     def error(candidate: tuple[float, ...]) -> float:
         if candidate not in known:
-            squared = offsets.residuals(y, features, penalties(candidate, degrees, len(y))) ** 2
+            squared = offsets.residuals(white, penalties(candidate, degrees, len(y))) ** 2
             if relative:
                 known[candidate] = float(np.log(squared.sum(axis=0) + 1e-12).mean())
             else:
@@ -179,7 +183,8 @@ def _chosen_offsets(y: Floats, features: Floats, degrees: Ints, groups: Ints) ->
     ridges = [_best_ridge(y, features, degrees, one, relative=False) for one in candidates]
     errors = np.empty((len(candidates), len(members)))
     for i, (offsets, ridge) in enumerate(zip(candidates, ridges, strict=True)):
-        squared = (offsets.residuals(y, features, penalties(ridge, degrees, len(y))) ** 2).sum(axis=1)
+        white = offsets.whitened(y), offsets.whitened(features)
+        squared = (offsets.residuals(white, penalties(ridge, degrees, len(y))) ** 2).sum(axis=1)
         errors[i] = [float(np.sqrt(squared[own]).sum()) for own in members]
     worse = errors - errors[np.argmin(errors.sum(axis=1))]
     chosen = int(np.argmax(worse.sum(axis=1) <= worse.std(axis=1, ddof=1) * np.sqrt(len(members))))

@@ -301,3 +301,15 @@ def nearest(
             break
     features_at(u, exponents, units, features, slopes)
     return u, triangle @ slopes
+
+
+@compiled
+def all_nearest(
+    starts: Floats, bound: float, exponents: Ints, units: Floats, rights: Floats, triangle: Floats, max_steps: int
+) -> tuple[Floats, Floats]:
+    """`nearest` of every row of `rights` (K, F). Shapes (K, P) and (K, F, P)."""
+    n_features, n_components = triangle.shape[0], exponents.shape[1]
+    positions, slopes = np.empty((len(rights), n_components)), np.empty((len(rights), n_features, n_components))
+    for k in range(len(rights)):
+        positions[k], slopes[k] = nearest(starts, bound, exponents, units, rights[k], triangle, max_steps)
+    return positions, slopes
