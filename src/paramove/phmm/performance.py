@@ -25,8 +25,8 @@ PARTS, PART_FRAMES = 5, 20
 LATE_ROWS = 2
 """Rows of that description that alone may predict theta better: of movements that end at their target."""
 BEGINNING_SHRINKAGES = (0.1, 0.3)
-OUTLIER_SHRINKAGE = 0.2
-"""What estimates theta best is too forgiving for movements of another kind: it takes correlations for chance."""
+OUTLIER_SHRINKAGE = 0.5
+"""What estimates theta best may take nearly all correlations for chance; then movements of another kind pass."""
 PACE_PARTS, PACE_SHRINKAGE, PACE_WEIGHT = 10, 0.1, 0.35
 
 

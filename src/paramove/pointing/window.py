@@ -193,7 +193,7 @@ class PointingWindowOptions:
     Attributes:
         points: of the arm, as `ArmPose` names them. ("elbow", "wrist") are the paper's; they do not distinguish
             pointing from reaching, which ("elbow", "wrist", "index") do.
-        level: minimum p-value of a pointing.
+        level: minimum p-value of a pointing; low, since errors of a body tracker are not in the training.
         min_lead: logarithm of the minimum ratio of the window's density as pointing to that as reaching.
         settled_s: a pointing is over after this time without a better window.
         max_gap_s: a longer time without samples, or without one of the points, starts a new window.
@@ -202,7 +202,7 @@ class PointingWindowOptions:
     """
 
     points: tuple[str, ...] = ("elbow", "wrist", "index")
-    level: float = 0.01
+    level: float = 0.002
     min_lead: float = 7.0
     settled_s: float = 0.12
     max_gap_s: float = 0.25
