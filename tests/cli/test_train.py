@@ -58,6 +58,16 @@ def test_numbers(trained, tmp_path):
     assert about.source == "synthetic demonstrator, seed 0"
 
 
+def test_regions_that_hold_less_than_they_promise_are_reported(trained, tmp_path):
+    arguments = ("--out", tmp_path / "model.npz", "--residuals", "independent", *QUICK)
+    assert (
+        "% of the 95 % regions hold the label of a movement that was left out" in good(trained.table, *arguments).stdout
+    )
+    done = good(trained.table, *arguments, "--json")
+    assert "reaching: only" in done.stderr
+    assert json.loads(done.stdout)[0]["left_out"]["theta_covered"] < 0.85
+
+
 def test_the_same_again_gives_the_same_file(trained, tmp_path):
     once, again = tmp_path / "once.npz", tmp_path / "again.npz"
     for file in (once, again, again):

@@ -147,11 +147,13 @@ def _with_points(message: str, names: tuple[str, ...]) -> str:
 
 
 def _tell(trained: list[Trained], report: Path | None, as_json: bool) -> None:
-    from paramove.training import sentences
+    from paramove.training import coverage_warning, sentences
 
     facts = [one.facts() for one in trained]
     if as_json:
         typer.echo(json.dumps(facts, indent=2, ensure_ascii=False))
+        for warning in filter(None, map(coverage_warning, facts)):
+            typer.echo(f"warning: {printable(warning)}", err=True)
         return
     for one in facts:
         typer.echo(printable(one["action"]))

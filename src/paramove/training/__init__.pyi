@@ -24,6 +24,7 @@ from .pictures import plot_synthesis as plot_synthesis
 from .pictures import state_seconds as state_seconds
 from .pictures import title_of as title_of
 from .recognition_pictures import plot_recognition as plot_recognition
+from .report import coverage_warning as coverage_warning
 from .report import cross_validation_rows as cross_validation_rows
 from .report import sentences as sentences
 from .report import write_training_report as write_training_report

@@ -20,6 +20,8 @@ from paramove.training.training import Trained
 
 DPI = 90
 WORST = 8
+MIN_COVERED = 0.85
+"""Of the 95 % regions of left-out movements: with less there is a warning."""
 
 
 def write_training_report(trained: Sequence[Trained], path: Path, remarks: Sequence[str] = ()) -> None:
@@ -54,6 +56,8 @@ def sentences(facts: dict[str, Any]) -> list[tuple[str, str]]:
         ))  # fmt: skip
     if facts["left_out"]:
         rows += cross_validation_rows(facts["left_out"])
+        warning = coverage_warning(facts)
+        rows += [("  warning", warning)] if warning else []
     if facts["file"]:
         rows.append(("written", facts["file"]))
     return rows
@@ -74,6 +78,18 @@ def cross_validation_rows(left: dict[str, Any]) -> list[tuple[str, str]]:
         ("  error of synthesis", f"median {100 * left['synthesis_median_m']:.2g} cm, 95 % below "
          f"{100 * left['synthesis_p95_m']:.2g} cm, after time warping"),
     ]  # fmt: skip
+
+
+def coverage_warning(facts: dict[str, Any]) -> str | None:
+    """What to say where regions of theta hold less than they promise; None where they hold it or were not tested."""
+    left = facts["left_out"]
+    if not left or left["theta_covered"] >= MIN_COVERED:
+        return None
+    return (
+        f"{facts['action']}: only {100 * left['theta_covered']:.0f} % of the 95 % regions hold the label of a movement "
+        "that was left out. Do not rely on them: show more thetas and repetitions, compare another --model, or give "
+        "the persons"
+    )
 
 
 def _section(trained: Trained) -> str:
