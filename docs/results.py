@@ -266,6 +266,31 @@ def movements(out: Path) -> dict[str, Any]:
     return {"errors": errors, "sure": sure}
 
 
+def regions(out: Path) -> list[dict[str, Any]]:
+    """What regions of theta and p-values of the quadratic model hold, by task, with errors as text with their unit."""
+    found = []
+    for name in ("few", "real"):
+        for task, rows in load(out / f"{name}.json").items():
+            own, plain, ridge = (
+                {key: one["value"] for key, one in rows.get(row, {}).get("measures", {}).items()}
+                for row in (
+                    "paramove, quadratic PHMM",
+                    "paramove, quadratic PHMM as in the thesis",
+                    "ridge from all frames",
+                )
+            )
+            if "covered_50" not in own:
+                continue
+            factor, unit = (1.0, "°") if task.startswith("pointing") else (10.0, " mm")
+            theta, by_ridge = (f"{factor * one['theta']:.2f}{unit}" if "theta" in one else "–" for one in (own, ridge))
+            keys = ("covered_50", "covered_80", "covered", "covered_set", "below_1", "below_5", "below_20")
+            found.append(
+                {"task": task, "theta": theta, "ridge": by_ridge, "independent": plain.get("covered")}
+                | {key: own[key] for key in keys}
+            )
+    return found
+
+
 def pointing(out: Path) -> dict[str, Any]:
     """What the launch prints, and its numbers."""
     return {"lines": printed(out / "0.txt", "SUCCESS", "targets:"), **load(out / "0" / "latest" / "run.json")}
@@ -465,6 +490,16 @@ MEASUREMENTS = {
     ),
     "movements": Measurement(
         ("python -m studies peers --on real --jobs 2 --out {out} --json {out}/numbers.json",), movements, "hours"
+    ),
+    "regions": Measurement(
+        (
+            "python -m studies peers --on few --jobs 2 --method 'quadratic PHMM' --method 'ridge from' --out {out}/1"
+            " --json {out}/few.json",
+            "python -m studies real --jobs 2 --method 'quadratic PHMM' --task pointing --task table/reach"
+            " --task table/drink --out {out}/2 --json {out}/real.json",
+        ),
+        regions,
+        "10 minutes",
     ),
     "pointing": Measurement(("paramove launch pointing --headless --runs {out}/0",), pointing, "a minute"),
     "relocation": Measurement(
