@@ -266,7 +266,7 @@ def movements(out: Path) -> dict[str, Any]:
     return {"errors": errors, "sure": sure}
 
 
-def regions(out: Path) -> list[dict[str, Any]]:
+def regions(out: Path) -> dict[str, Any]:
     """What regions of theta and p-values of the quadratic model hold, by task, with errors as text with their unit."""
     found = []
     for name in ("few", "real"):
@@ -288,7 +288,7 @@ def regions(out: Path) -> list[dict[str, Any]]:
                 {"task": task, "theta": theta, "ridge": by_ridge, "independent": plain.get("covered")}
                 | {key: own[key] for key in keys}
             )
-    return found
+    return {"tasks": found}
 
 
 def pointing(out: Path) -> dict[str, Any]:
