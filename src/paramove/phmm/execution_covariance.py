@@ -83,7 +83,7 @@ class ExecutionCovariance:
                 without = (without - (1.0 - SHRINKAGE) * np.outer(own, own) / count) * count / (count - 1.0)
             excess[k] = moves[k] @ np.linalg.solve(without + 1e-12 * np.trace(without) * np.eye(len(gain)), moves[k])
         # The means have seen the tested executions, so the 95 % quantile decides.
-        inflation = max(1.0, inflation_of([excess], moves.shape[1], n_groups, quantile_weight=1.0))
+        inflation = inflation_of([excess], moves.shape[1], n_groups, quantile_weight=1.0, minimum=1.0)
         return cls(everything.factor, everything.own, inflation)
 
     @classmethod
