@@ -11,7 +11,7 @@ import numpy as np
 from paramove.alignment import movement_distance
 from paramove.documents import Floats
 from paramove.hmm import Path
-from paramove.phmm import InterpolativePHMM, MovementClassifier, NeuralPHMM, ParametricHMM, PolynomialPHMM
+from paramove.phmm import InterpolativePHMM, MovementClassifier, NeuralPHMM, ParametricHMM, has_p_values
 from studies.chapter4.grid import (
     ACTIONS,
     COMPARED_SAMPLES,
@@ -101,7 +101,7 @@ def _unfinished(models: Mapping[str, ParametricHMM], movements: Grid, seed: int,
 
 def score(model: ParametricHMM, x: Floats, log_likelihood: float | None = None) -> float:
     """How well a movement fits a model: the likelihood of the thesis (2.2.5), or minus the outlier score."""
-    if isinstance(model, PolynomialPHMM) and model.performances_ is not None:
+    if has_p_values(model):
         return -float(model.examine(x).outlier_score)
     return float(model.estimate(x).log_likelihood) if log_likelihood is None else log_likelihood
 

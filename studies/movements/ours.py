@@ -10,7 +10,15 @@ import numpy as np
 
 from paramove.documents import Floats
 from paramove.hmm import TrainingOptions
-from paramove.phmm import CubicPHMM, LinearPHMM, MovementClassifier, ParametricHMM, PolynomialPHMM, QuadraticPHMM
+from paramove.phmm import (
+    CubicPHMM,
+    LinearPHMM,
+    MovementClassifier,
+    ParametricHMM,
+    PolynomialPHMM,
+    QuadraticPHMM,
+    has_p_values,
+)
 from studies.movements.method import (
     BEGINNINGS,
     CLASSES,
@@ -53,7 +61,7 @@ class Models(NotAble):
 
     def estimate(self, x: Floats) -> Estimate:
         """The likeliest theta and its covariance."""
-        if BEGINNINGS in self.can and isinstance(self.model, PolynomialPHMM):
+        if has_p_values(self.model):
             examined = self.model.examine(x)
             return Estimate(examined.estimate.theta, examined.estimate.covariance, examined.p_value)
         estimate = self.model.estimate(x)
@@ -65,7 +73,7 @@ class Models(NotAble):
 
     def score(self, x: Floats) -> float:
         """Minus the outlier score; of models that have none, the log-likelihood at the likeliest theta."""
-        if BEGINNINGS in self.can and isinstance(self.model, PolynomialPHMM):
+        if has_p_values(self.model):
             return -self.model.examine(x).outlier_score
         return self.model.estimate(x).log_likelihood
 

@@ -277,7 +277,7 @@ def _few_persons(table: Recordings, action: str) -> list[Fold]:
     for draw in range(DRAWS if len(subjects) > FEW_PERSONS else 0):
         chosen = set(np.random.default_rng(draw).permutation(subjects)[:FEW_PERSONS].tolist())
         train = _table_examples([one for one in own if one.subject in chosen], table.fingertip, _TO_GRASP)
-        for subject in set(subjects) - chosen:
+        for subject in sorted(set(subjects) - chosen):
             test = _table_examples([one for one in own if one.subject == subject], table.fingertip, _TO_GRASP)
             folds.append(Fold(name, f"{draw}/{subject}", train, test, [], "place", table.fingertip))
     return folds

@@ -3,6 +3,7 @@ from .classification import Classification as Classification
 from .classification import MovementClassifier as MovementClassifier
 from .description import MovementDescription as MovementDescription
 from .examining import Examination as Examination
+from .examining import has_p_values as has_p_values
 from .grid import ParameterGrid as ParameterGrid
 from .interpolative import InterpolativePHMM as InterpolativePHMM
 from .model_cache import cached_model as cached_model

@@ -20,10 +20,11 @@ from scipy.special import logsumexp
 
 from paramove.documents import Floats, Ints, renamed_attribute
 from paramove.hmm import checked_sequence, checked_sequences
+from paramove.phmm.examining import has_p_values
 from paramove.phmm.left_out import fold_numbers
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
 from paramove.phmm.performance import BEGINNING_POINTS, FIRST_FRAMES, GROWTH, beginning_features, groups_of
-from paramove.phmm.polynomial import PolynomialPHMM, QuadraticPHMM
+from paramove.phmm.polynomial import QuadraticPHMM
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 
 SHRINKAGE = 0.1
@@ -200,7 +201,7 @@ def _result(model: ParametricHMM, sequence: Floats, finished: bool) -> tuple[Par
     Scores of models with correlated residuals are logarithms of p-values: densities of movements that lie far from
     every model (another person's) would compare the widths of the models instead of the distances from them.
     """
-    if isinstance(model, PolynomialPHMM) and model.performances_ is not None:
+    if has_p_values(model):
         examination = model.examine(sequence, finished=finished)
         return examination.estimate, examination.log_p_value, examination.p_value
     estimate = model.estimate(sequence, finished=finished)

@@ -31,7 +31,7 @@ SHRINKAGES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
 """Candidates for the fraction of each variance that counts as independent."""
 NEWTON_STEPS = 12
 MARGIN = 1.0
-"""How far outside the bounds of the training theta of left-out movements may lie, as a fraction of their width."""
+"""How far outside the bounds of the training left-out movements may lie, as a fraction of the width of theta."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,10 @@ class CorrelatedRegression:
         shrinkages: tuple[float, ...] = SHRINKAGES,
     ) -> tuple[CorrelatedRegression, float]:
         """And the mean error of scaled theta of left-out groups, infinite if no group could be left out."""
-        units = _left_out_units(theta, monomials, groups)
         features, one_each = monomials.at(theta), one_theta_each(theta, groups)
+        # Single movements are left out where a theta that was left out could not be predicted.
+        few = one_each and len(np.unique(groups)) <= len(monomials) + 1
+        units = np.arange(len(theta)) if few else groups
         ridge = ridge if ridge is not None else chosen_ridge(y, features, monomials.degrees, units)
 
         def of(own: Ints) -> _Fit:
@@ -109,8 +111,8 @@ class CorrelatedRegression:
 
         results = left_out(folds)
         tests = [results[1]]
-        error = float(np.nanmean(results[0])) if folds and units is groups else np.inf
-        if units is groups and one_each:
+        error = float(np.nanmean(results[0])) if folds and not few else np.inf
+        if one_each and not few:
             # Whole groups test extrapolation; how movements of one theta vary is tested by leaving out single ones.
             shuffled = np.random.default_rng(0).permutation(len(y))
             results = left_out((tested, of(others)) for tested, others in folds_of(shuffled))
@@ -150,7 +152,7 @@ class CorrelatedRegression:
             own.starts, bound, own.exponents, own.logistic, y @ projector.T, triangle, NEWTON_STEPS
         )
         theta: Floats = own.centre + own.scale * positions
-        information = np.swapaxes(slopes, 1, 2) @ slopes / self._variances_at(own.at(theta))[:, None, None]
+        information = np.swapaxes(slopes, 1, 2) @ slopes / variances_at(own.at(theta), self.uncertainty)[:, None, None]
         information += np.eye(len(own.scale)) / bound**2
         return theta, np.linalg.inv(information) * (self.inflation * own.scale[:, None] * own.scale)
 
@@ -158,13 +160,8 @@ class CorrelatedRegression:
         """`distance` of many movements (K, n) from those of theta (K, P). Shape (K,)."""
         self._check_length(y[0])
         phi = self.monomials.at(theta)
-        white, factors = (y - phi @ self.coefficients.T) @ self._condensing[0].T, self._variances_at(phi)
+        white, factors = (y - phi @ self.coefficients.T) @ self._condensing[0].T, variances_at(phi, self.uncertainty)
         result: Floats = (white**2).sum(axis=1) / factors + y.shape[1] * np.log(factors)
-        return result
-
-    def _variances_at(self, phi: Floats) -> Floats:
-        """Factor on C for an unseen movement with features phi (K, F): 1 + phi' V phi. Shape (K,)."""
-        result: Floats = 1.0 + ((phi @ self.uncertainty) * phi).sum(axis=1)
         return result
 
     def widened(self, covariance: Floats) -> CorrelatedRegression:
@@ -239,7 +236,7 @@ class CorrelatedRegression:
 
 @dataclass(frozen=True)
 class _Fit:
-    """Coefficients of some of the movements, before anything is chosen; residuals are studentised, (K, n)."""
+    """Coefficients of some of the movements, before anything is chosen; residuals are rescaled, (K, n)."""
 
     monomials: Monomials
     coefficients: Floats
@@ -268,19 +265,13 @@ class _Fit:
         )  # fmt: skip
 
 
-def _left_out_units(theta: Floats, monomials: Monomials, groups: Ints) -> Ints:
-    """What cross-validation leaves out: groups, or single movements where a theta left out could not be predicted."""
-    few = len(np.unique(groups)) <= len(monomials) + 1 and one_theta_each(theta, groups)
-    return np.arange(len(theta)) if few else groups
-
-
 def _chosen_shrinkage(folds: list[tuple[Ints, _Fit]], y: Floats, theta: Floats, candidates: tuple[float, ...]) -> float:
     """Shrinkage that makes theta of left-out movements most likely.
 
     Regions may be inflated later, so it is their shape and their relative size that count.
     """
     best, smallest = candidates[-1], np.inf
-    for shrinkage in candidates if folds else ():
+    for shrinkage in candidates if folds and len(candidates) > 1 else ():
         results = [_linearised(fit, fit.root(shrinkage), y[tested], theta[tested]) for tested, fit in folds]
         excess, log_volumes = np.concatenate(results, axis=1)
         score = float(log_volumes.mean()) + theta.shape[1] * float(np.log(excess.mean() + 1e-300))
@@ -297,13 +288,19 @@ def _linearised(fit: _Fit, root: Floats, y: Floats, theta: Floats) -> Floats:
     wide = np.concatenate([slopes, (y - phi @ fit.coefficients.T).T[:, :, None]], axis=2).reshape(len(root), -1)
     white = solve_triangular(root, wide, lower=True, check_finite=False).reshape(-1, count, dimension + 1)
     slopes, missed = white[..., :-1], white[..., -1]
-    factor = 1.0 + np.einsum("kf,fg,kg->k", phi, fit.uncertainty, phi)
+    factor = variances_at(phi, fit.uncertainty)
     information = np.einsum("nkp,nkq->kpq", slopes, slopes) / factor[:, None, None]
     information += np.eye(dimension) / (1.0 + 2.0 * MARGIN) ** 2
     gradient = np.einsum("nkp,nk->kp", slopes, missed) / factor[:, None]
     error = np.linalg.solve(information, gradient[..., None])[..., 0]
     excess = np.einsum("kp,kp->k", error, gradient)
     return np.stack([excess, -np.linalg.slogdet(information)[1]])
+
+
+def variances_at(phi: Floats, uncertainty: Floats) -> Floats:
+    """Factor on C for unseen movements with features phi (K, F): 1 + phi' V phi. Shape (K,)."""
+    result: Floats = 1.0 + ((phi @ uncertainty) * phi).sum(axis=1)
+    return result
 
 
 def shrunk(residuals: Floats, shrinkage: float) -> Floats:

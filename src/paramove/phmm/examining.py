@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,6 +40,11 @@ class Examination(NamedTuple):
 
 for _old, _new in (("strangeness", "outlier_score"), ("typicality", "p_value"), ("log_typicality", "log_p_value")):
     setattr(Examination, _old, renamed_attribute(_old, _new))
+
+
+def has_p_values(model: ParametricHMM) -> TypeGuard[ExaminingPHMM]:
+    """Whether a model describes how demonstrations vary, and so which movements are outliers."""
+    return isinstance(model, ExaminingPHMM) and model.performances_ is not None
 
 
 class ExaminingPHMM(ParametricHMM):

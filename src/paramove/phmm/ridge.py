@@ -15,7 +15,7 @@ MAX_ROUNDS = 4
 SIMPLER = 0.005
 """A degree above 1 is regularised as far as possible while errors grow by no more than this fraction."""
 MIN_LEFT = 1e-3
-"""A residual of which the fit took all but this fraction says nothing about the movement."""
+"""A residual of which the fit took all but this fraction has no information about the movement."""
 OFFSETS = (0.0, 0.1, 0.3, 1.0, 3.0)
 """Candidates for the variance of `GroupOffsets`."""
 
@@ -75,7 +75,7 @@ def smoothed(features: Floats, degrees: Ints, values: Floats, groups: Ints) -> F
 def residuals_left_out(y: Floats, features: Floats, penalty: Floats, groups: Ints) -> Floats:
     """Residual of each movement from a regression without its group, for all at once: (I - H)^-1 r. Shape (K, n).
 
-    Of a single group: its own residuals, as large as their degrees of freedom say.
+    Of a single group: its own residuals, enlarged by the degrees of freedom that the fit took.
     """
     if len(np.unique(groups)) < 2:
         return studentised_residuals(y, features, penalty, groups)

@@ -119,14 +119,6 @@ def _responsibilities(features: Floats, movement: Movement) -> tuple[float, Floa
 
 
 @compiled
-def responsibilities_at(u: Floats, movement: Movement) -> Floats:
-    """gamma_i(t) (2.14). Shape (N, T)."""
-    features, slopes = np.empty(len(movement.exponents)), np.empty(movement.exponents.shape)
-    monomials_at(u, movement.exponents, features, slopes)
-    return _responsibilities(features, movement)[1]
-
-
-@compiled
 def _aligned(features: Floats, movement: Movement) -> tuple[float, Floats, Floats, Floats]:
     """ln p with these monomials, how many frames each state has (N,), the sum of these (N, D), and the means (N, D)."""
     value, gamma, means = _responsibilities(features, movement)

@@ -11,7 +11,7 @@ from scipy.special import chdtri  # scipy.stats would take half a second to impo
 
 from paramove.demonstrations import BODY, DemonstrationError, Movement, in_body_frame, mirrored, resampled
 from paramove.documents import Floats, InputError, renamed_attribute
-from paramove.phmm import MovementClassifier, MovementDescription, ParameterEstimate, ParametricHMM
+from paramove.phmm import MovementClassifier, MovementDescription, ParameterEstimate, ParametricHMM, has_p_values
 from paramove.training.drawing import bounds, parameter_names
 from paramove.training.kinds import kind_of
 from paramove.training.leaving_out import REGION, covers
@@ -148,21 +148,15 @@ class Examiner:
     def _classified(
         self, movement: Movement, finished: bool
     ) -> tuple[str, dict[str, float], ParameterEstimate, float | None]:
-        with_p_values = {action: has_p_values(model) for action, model in self.models.items()}
         if len(self.models) == 1 and not finished:  # no other action whose beginning it could be
             ((action, model),) = self.models.items()
-            if not with_p_values[action]:
+            if not has_p_values(model):
                 return action, {action: 1.0}, model.estimate(movement.frames, finished=False), None
-            examination = model.examine(movement.frames, finished=False)  # type: ignore[attr-defined]
+            examination = model.examine(movement.frames, finished=False)
             return action, {action: 1.0}, examination.estimate, examination.p_value
         result = self.classifier.classify(movement.frames, finished=finished)
-        p_value = result.p_value if with_p_values[result.action] else None
+        p_value = result.p_value if has_p_values(self.models[result.action]) else None
         return result.action, result.posterior, result.estimates[result.action], p_value
-
-
-def has_p_values(model: ParametricHMM) -> bool:
-    """Whether a model describes how demonstrations vary, and so which movements are outliers."""
-    return getattr(model, "performances_", None) is not None
 
 
 def _scored_by(model: ParametricHMM) -> tuple[object, ...]:

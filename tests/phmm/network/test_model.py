@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from paramove.demonstrations.edge import strongly_nonlinear_movement, strongly_nonlinear_movements
 from paramove.hmm import TrainingOptions
 from paramove.hmm.training import LikelihoodDecreaseWarning
-from paramove.phmm import NeuralPHMM, QuadraticPHMM
+from paramove.phmm import MovementClassifier, NeuralPHMM, QuadraticPHMM
 from paramove.phmm.network.choice import Choice, _better, _left_out_errors
 from paramove.phmm.network.networks import StateNetworks, StateTargets, drawn_inner
 from tests.phmm.movements import numerical_gradient, shown, wave
@@ -152,6 +152,15 @@ def test_more_units_must_be_better_in_nearly_all_folds(gains: tuple[float, ...],
     errors = -np.array([*gains, np.mean(gains)])
     assert _better(errors, known, more=True) == better
     assert _better(errors, known, more=False)
+
+
+def test_a_classifier_of_networks_rejects_a_movement_that_stops() -> None:
+    model = NeuralPHMM(8, 4, 6, options=TrainingOptions(max_iterations=8)).fit(*shown(2))
+    classifier = MovementClassifier.from_models({"wave": model})
+    x = wave(np.array([0.4, 0.6]), np.random.default_rng(3))
+    assert 0.01 < classifier.classify(x).p_value < 1.0
+    stopped = np.concatenate([x[:20], np.repeat(x[20:21], 20, axis=0)])
+    assert classifier.classify(stopped).p_value < 0.01
 
 
 def test_restarts_are_drawn_from_the_seed() -> None:
