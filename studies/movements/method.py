@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from paramove.documents import Floats, Ints
 
 SYNTHESIS, THETA, CLASSES, BEGINNINGS, OUTLIERS = "synthesis", "theta", "classes", "beginnings", "outliers"
+THETA_OF_BEGINNINGS = "theta of beginnings"
 """What a method declares that it can do; the tables show a dash for anything else."""
 FRAMES = 100
 """Frames that movements are resampled to wherever a method needs equal lengths."""
@@ -84,6 +85,9 @@ class Method(Protocol):
     def estimate(self, x: Floats) -> Estimate:
         """The parameter of a finished movement (T, D)."""
 
+    def estimate_beginning(self, x: Floats) -> Floats:
+        """The parameter (P,) of a beginning (T, D): how long it will be is unknown."""
+
     def classify(self, x: Floats, finished: bool) -> str:
         """The action of a movement (T, D); of a beginning where not finished: how long it will be is unknown."""
 
@@ -107,6 +111,10 @@ class NotAble:
     def estimate(self, x: Floats) -> Estimate:
         """Raises NotImplementedError."""
         raise NotImplementedError(f"{type(self).__name__} cannot estimate parameters")
+
+    def estimate_beginning(self, x: Floats) -> Floats:
+        """Raises NotImplementedError."""
+        raise NotImplementedError(f"{type(self).__name__} cannot estimate parameters of beginnings")
 
     def classify(self, x: Floats, finished: bool) -> str:
         """Raises NotImplementedError."""

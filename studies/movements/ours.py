@@ -26,6 +26,7 @@ from studies.movements.method import (
     OUTLIERS,
     SYNTHESIS,
     THETA,
+    THETA_OF_BEGINNINGS,
     Estimate,
     Examples,
     Method,
@@ -46,7 +47,7 @@ class Models(NotAble):
         self.make = make
         model = make()
         if isinstance(model, PolynomialPHMM) and model.residuals == "correlated":
-            self.can = Models.can | {BEGINNINGS}
+            self.can = Models.can | {BEGINNINGS, THETA_OF_BEGINNINGS}
 
     def fit(self, examples: Examples) -> None:
         """Learn from movements of one or several actions; nothing is chosen by parts of a person's movements."""
@@ -66,6 +67,10 @@ class Models(NotAble):
             return Estimate(examined.estimate.theta, examined.estimate.covariance, examined.p_value)
         estimate = self.model.estimate(x)
         return Estimate(estimate.theta, estimate.covariance)
+
+    def estimate_beginning(self, x: Floats) -> Floats:
+        """The average over what the beginning may be."""
+        return self.model.estimate(x, finished=False).theta
 
     def classify(self, x: Floats, finished: bool) -> str:
         """The most probable action."""

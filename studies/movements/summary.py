@@ -62,6 +62,10 @@ QUANTITIES = (
     Quantity("theta", "θ error, mean", "θ", False, ("theta",), _mean),
     Quantity("theta_median", "θ error, median", "θ", False, ("theta",), _median),
     Quantity("theta_p95", "θ error, 95 %", "θ", False, ("theta",), _p95),
+    *(
+        Quantity(f"theta_{percent}", f"θ error after {percent} %", "θ", False, (f"theta_{percent}",), _mean)
+        for percent in (25, 50, 75)
+    ),
     Quantity("covered_50", "50 % region covers", "%", True, ("covered_50",), _percent),
     Quantity("covered_80", "80 % region covers", "%", True, ("covered_80",), _percent),
     Quantity("covered", "95 % region covers", "%", True, ("covered",), _percent),

@@ -15,7 +15,7 @@ A fold leaves out a whole direction, person or grid, never single repetitions at
 - `raster/<action>`, `raster/actions`, `raster/beginnings`: the synthetic demonstrator; 3 x 3 targets 10 times against
   7 x 5 targets 4 times; a fold is a seed.
 - `scripted/same`, `scripted/3 mm`: minimum-jerk movements of a point to 3 x 3 targets, 4 times with 1 mm of noise; the
-  latter with ends that vary by 3 mm. `raster/2 repetitions`, 5, 20: the demonstrator's reaching. Each fold is a set.
+  latter with ends that vary by 3 mm. `raster/1 repetition`, 2, 5, 20: the demonstrator's reaching. Each fold is a set.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from studies.movements.per_action import first_frames
 GRID_ACTIONS = ("reaching", "pointing")
 FIRST_MS = (100, 200, 400)
 FEW_PERSONS, DRAWS = 5, 2
-REPETITIONS = (2, 5, 20)
+REPETITIONS = (1, 2, 5, 20)
 SCRIPTED = {"same": 0.0, "3 mm": 0.003}
 """Standard deviation of where scripted movements begin and end, m."""
 SCRIPTED_NOISE_M, SCRIPTED_FRAMES = 0.001, 100
@@ -139,7 +139,7 @@ def few_tasks(seeds: Sequence[int] = tuple(range(20))) -> dict[str, list[Fold]]:
         for name, deviation in SCRIPTED.items()
     }
     for repetitions in REPETITIONS:
-        name = f"raster/{repetitions} repetitions"
+        name = f"raster/{repetitions} repetition{'s' if repetitions > 1 else ''}"
         tasks[name] = [
             Fold(name, str(seed), _grid("reaching", 3, 3, repetitions, [seed, 2]),
                  _grid("reaching", 7, 5, 2, [seed, 3]), [], "raster", 5)

@@ -9,11 +9,21 @@ import numpy as np
 
 from studies.movements.disturbed import aborted, stopped
 from studies.movements.measures import covered, synthesis_errors, theta_error
-from studies.movements.method import BEGINNINGS, CLASSES, FRAMES, OUTLIERS, SYNTHESIS, THETA, Method
+from studies.movements.method import (
+    BEGINNINGS,
+    CLASSES,
+    FRAMES,
+    OUTLIERS,
+    SYNTHESIS,
+    THETA,
+    THETA_OF_BEGINNINGS,
+    Method,
+)
 from studies.movements.tasks import Fold
 
 FRACTIONS = (0.25, 0.5, 0.75, 1.0)
-"""Fractions of a movement, from its onset, after which its kind is estimated."""
+"""Fractions of a movement, from its onset, after which its kind or theta is estimated."""
+SHORTEST_BEGINNING = 5
 
 REGIONS = {"covered_50": 0.5, "covered_80": 0.8, "covered": 0.95}
 LEVELS = {"below_1": 0.01, "below_5": 0.05, "below_20": 0.2}
@@ -24,7 +34,7 @@ Numbers = dict[str, list[float]]
 def able(method: Method, fold: Fold) -> bool:
     """Whether a method can do any of the tasks of a fold."""
     if not fold.several_actions:
-        return bool(method.can & {SYNTHESIS, THETA, OUTLIERS})
+        return bool(method.can & {SYNTHESIS, THETA, THETA_OF_BEGINNINGS, OUTLIERS})
     return (BEGINNINGS if fold.beginnings else CLASSES) in method.can
 
 
@@ -62,6 +72,11 @@ def _single_action(method: Method, fold: Fold, values: Numbers, seconds: dict[st
                 _add(values, {name: float(estimate.p_value < level) for name, level in LEVELS.items()})
         if "covered" in values:
             values["covered_set"] = [float(np.mean(values["covered"]))]
+    if THETA_OF_BEGINNINGS in method.can:
+        for x, theta in zip(fold.test.sequences, fold.test.theta, strict=True):
+            for fraction in FRACTIONS[:-1]:
+                found = method.estimate_beginning(x[: max(SHORTEST_BEGINNING, round(fraction * len(x)))])
+                _add(values, {f"theta_{round(100 * fraction)}": theta_error(found, theta, fold.kind)})
     if OUTLIERS in method.can:
         rng = np.random.default_rng(0)
         tests = fold.test.sequences

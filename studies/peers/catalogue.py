@@ -15,7 +15,7 @@ from studies.peers.input_driven_hmm import InputDrivenHMM
 from studies.peers.minirocket import MiniRocket
 from studies.peers.nearest import NearestByWarping
 from studies.peers.promp import ContextualProMP
-from studies.peers.ridge import AlignedRidge, FrameRidge
+from studies.peers.ridge import AlignedRidge, FrameRidge, MotionRidge
 from studies.peers.tuning import Tuned
 
 Parameters = dict[str, Any]
@@ -72,6 +72,7 @@ def ridge_rows() -> list[Row]:
     rest = (AlignedRidge, candidates, ("tslearn", "scikit-learn"))
     return [
         Row("ridge from all frames", lambda seed: FrameRidge(), "", ("scikit-learn",)),
+        Row("ridge from position and velocity", lambda seed: MotionRidge(), "", ("scikit-learn",)),
         *both("DTW + PCA + quadratic ridge, diagonal", *rest),
         *both("DTW + PCA + quadratic ridge, full covariance", *rest, covariance="full"),
         *both("PCA + quadratic ridge, full covariance", *rest, covariance="full", warped=False),

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from paramove.documents import Floats
 from paramove.hmm import resample
-from studies.movements.method import FRAMES, OUTLIERS, SYNTHESIS, THETA, Estimate, Examples, NotAble
+from studies.movements.method import (
+    FRAMES,
+    OUTLIERS,
+    SYNTHESIS,
+    THETA,
+    THETA_OF_BEGINNINGS,
+    Estimate,
+    Examples,
+    NotAble,
+)
 from studies.peers.library import library
 from studies.peers.linear_gaussian import LinearGaussian, QuadraticFeatures
 
 ALPHAS = np.logspace(-4, 3, 15)
 FRAME_ALPHAS = np.logspace(-6, 3, 19)
+VELOCITY_FRAMES = 6
 
 
 class FrameRidge(NotAble):
@@ -30,6 +40,30 @@ class FrameRidge(NotAble):
     def estimate(self, x: Floats) -> Estimate:
         """What the regression gives."""
         return Estimate(np.asarray(self.ridge.predict(resample(x, FRAMES).ravel()[None])[0]), None)
+
+
+class MotionRidge(NotAble):
+    """Ridge regression from the positions and velocities of all points at one moment to theta, for each moment."""
+
+    can = frozenset({THETA_OF_BEGINNINGS})
+
+    def fit(self, examples: Examples) -> None:
+        """Learn from movements of one action."""
+        self.examples, self.ridges = examples, dict[int, Any]()
+
+    def estimate_beginning(self, x: Floats) -> Floats:
+        """What the regression for the time that has passed gives; movements that had ended stay at their end."""
+        linear_model, n = library("sklearn.linear_model", "scikit-learn"), len(x)
+        if n not in self.ridges:
+            rows = np.stack([_motion(one[:n]) for one in self.examples.sequences])
+            self.ridges[n] = linear_model.RidgeCV(alphas=FRAME_ALPHAS).fit(rows, self.examples.theta)
+        return np.asarray(self.ridges[n].predict(_motion(x)[None])[0])
+
+
+def _motion(x: Floats) -> Floats:
+    """Last frame and its mean velocity over at most six frames, per frame. Shape (2 D,)."""
+    before = x[max(0, len(x) - 1 - VELOCITY_FRAMES)]
+    return np.concatenate([x[-1], (x[-1] - before) / VELOCITY_FRAMES])
 
 
 class AlignedRidge(NotAble):

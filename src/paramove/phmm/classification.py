@@ -19,11 +19,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp
 
 from paramove.documents import Floats, Ints, renamed_attribute
-from paramove.hmm import checked_sequence, checked_sequences
+from paramove.hmm import checked_sequence, checked_sequences, resample
+from paramove.phmm.beginnings import FIRST_FRAMES
 from paramove.phmm.examining import has_p_values
 from paramove.phmm.left_out import fold_numbers
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
-from paramove.phmm.performance import BEGINNING_POINTS, FIRST_FRAMES, GROWTH, beginning_features, groups_of
+from paramove.phmm.performance import groups_of
 from paramove.phmm.polynomial import QuadraticPHMM
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 
@@ -31,6 +32,8 @@ SHRINKAGE = 0.1
 """Fraction of each variance that counts as independent."""
 TEMPERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05)
 """Candidates for the factor on distances: features are not as normally distributed as the model assumes."""
+POINTS, GROWTH = 5, 1.25
+"""Beginnings are described by 5 points, at 5 frames and then at every length a quarter longer."""
 INDEX_FILE = "classifier.npz"
 
 
@@ -297,8 +300,7 @@ class BeginningDiscriminant:
 
 def growth_features(sequence: Floats, n_frames: int) -> Floats:
     """Increments of a movement over its first frames, independent of its starting point. Shape (4 D,)."""
-    features = beginning_features(sequence, n_frames).reshape(BEGINNING_POINTS, -1)
-    return features[1:].ravel()
+    return np.diff(resample(sequence[:n_frames], POINTS), axis=0).ravel()
 
 
 def discriminants(

@@ -12,8 +12,8 @@ of the correlations, and the inflation of regions of theta that gives them their
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -146,23 +146,12 @@ class CorrelatedRegression:
     def estimates(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
         """`estimate` of many movements (K, n): theta (K, P) and covariances (K, P, P)."""
         self._check_length(y[0])
-        _, projector, triangle = self._condensing
-        own, bound = self.monomials, 1.0 + 2.0 * margin
-        positions, slopes = all_nearest(
-            own.starts, bound, own.exponents, own.logistic, y @ projector.T, triangle, NEWTON_STEPS
-        )
-        theta: Floats = own.centre + own.scale * positions
-        information = np.swapaxes(slopes, 1, 2) @ slopes / variances_at(own.at(theta), self.uncertainty)[:, None, None]
-        information += np.eye(len(own.scale)) / bound**2
-        return theta, np.linalg.inv(information) * (self.inflation * own.scale[:, None] * own.scale)
+        return self.condensed.estimates(y, margin)
 
     def distances_from(self, y: Floats, theta: Floats) -> Floats:
         """`distance` of many movements (K, n) from those of theta (K, P). Shape (K,)."""
         self._check_length(y[0])
-        phi = self.monomials.at(theta)
-        white, factors = (y - phi @ self.coefficients.T) @ self._condensing[0].T, variances_at(phi, self.uncertainty)
-        result: Floats = (white**2).sum(axis=1) / factors + y.shape[1] * np.log(factors)
-        return result
+        return self.condensed.distances_from(y, theta)
 
     def widened(self, covariance: Floats) -> CorrelatedRegression:
         """With noise of that covariance (n, n) in every movement."""
@@ -224,14 +213,71 @@ class CorrelatedRegression:
             raise ValueError(f"expected a movement of {len(self.coefficients)} numbers, found {len(y)}")
 
     @cached_property
-    def _condensing(self) -> tuple[Floats, Floats, Floats]:
-        """L^-1, Q' L^-1 and R, where L^-1 Z = Q R: |L^-1 (y - Z phi)|^2 = |Q' L^-1 y - R phi|^2 + a rest.
+    def condensed(self) -> CondensedRegressions:
+        """As the search takes it."""
+        return CondensedRegressions.of([self])
 
-        So the search takes as many numbers as there are monomials.
-        """
-        inverse = solve_triangular(self.root, np.eye(len(self.root)), lower=True)
-        basis, triangle = np.linalg.qr(inverse @ self.coefficients)
-        return np.ascontiguousarray(inverse), np.ascontiguousarray(basis.T @ inverse), np.ascontiguousarray(triangle)
+
+@dataclass(frozen=True)
+class CondensedRegressions:
+    """One regression of all movements, or one for each, R in all, as the search for theta takes them.
+
+    |L^-1 (y - Z phi)|^2 = |Q' L^-1 y - R phi|^2 + a rest, where L^-1 Z = Q R: so the search takes as many numbers as
+    there are monomials.
+
+    Attributes:
+        monomials: of all of them.
+        inverses: L^-1, (R, n, n). white: L^-1 Z, (R, n, F). projectors: Q' L^-1, (R, F, n). triangles: R, (R, F, F).
+        uncertainty: V, (R, F, F). inflation: (R,). log_norms: logarithm of the density at distance 0, (R,).
+    """
+
+    monomials: Monomials
+    inverses: Floats
+    white: Floats
+    projectors: Floats
+    triangles: Floats
+    uncertainty: Floats
+    inflation: Floats
+    log_norms: Floats
+
+    @classmethod
+    def of(cls, regressions: Sequence[CorrelatedRegression]) -> CondensedRegressions:
+        """Of regressions of the same monomials and the same length of movements."""
+        size = len(regressions[0].root)
+        inverses = np.stack([solve_triangular(one.root, np.eye(size), lower=True) for one in regressions])
+        white = inverses @ np.stack([one.coefficients for one in regressions])
+        bases, triangles = np.linalg.qr(white)
+        return cls(
+            regressions[0].monomials, inverses, white, np.swapaxes(bases, 1, 2) @ inverses,
+            np.ascontiguousarray(triangles), np.stack([one.uncertainty for one in regressions]),
+            np.array([one.inflation for one in regressions]), np.array([one.log_density(0.0) for one in regressions]),
+        )  # fmt: skip
+
+    def part(self, chosen: slice) -> CondensedRegressions:
+        """Some of them."""
+        everything = [getattr(self, field.name) for field in fields(self)]
+        return CondensedRegressions(everything[0], *(one[chosen] for one in everything[1:]))
+
+    def estimates(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
+        """Of movements (K, n) theta (K, P) and its covariances (K, P, P), see `CorrelatedRegression.estimate`."""
+        own, bound = self.monomials, 1.0 + 2.0 * margin
+        condensed = (self.projectors @ y[..., None])[..., 0]
+        positions, slopes = all_nearest(
+            own.starts, bound, own.exponents, own.logistic, condensed, self.triangles, NEWTON_STEPS
+        )
+        theta: Floats = own.centre + own.scale * positions
+        information = np.swapaxes(slopes, 1, 2) @ slopes / variances_at(own.at(theta), self.uncertainty)[:, None, None]
+        information += np.eye(len(own.scale)) / bound**2
+        units = self.inflation[:, None, None] * (own.scale[:, None] * own.scale)
+        return theta, np.linalg.inv(information) * units
+
+    def distances_from(self, y: Floats, theta: Floats) -> Floats:
+        """Of movements (K, n) from those of theta (K, P), see `CorrelatedRegression.distance`. Shape (K,)."""
+        phi = self.monomials.at(theta)
+        missed = (self.inverses @ y[..., None] - self.white @ phi[..., None])[..., 0]
+        factors = variances_at(phi, self.uncertainty)
+        result: Floats = (missed**2).sum(axis=1) / factors + y.shape[1] * np.log(factors)
+        return result
 
 
 @dataclass(frozen=True)
@@ -298,8 +344,8 @@ def _linearised(fit: _Fit, root: Floats, y: Floats, theta: Floats) -> Floats:
 
 
 def variances_at(phi: Floats, uncertainty: Floats) -> Floats:
-    """Factor on C for unseen movements with features phi (K, F): 1 + phi' V phi. Shape (K,)."""
-    result: Floats = 1.0 + ((phi @ uncertainty) * phi).sum(axis=1)
+    """Factor on C for unseen movements with features phi (K, F): 1 + phi' V phi; V of all or of each. Shape (K,)."""
+    result: Floats = 1.0 + ((phi[:, None] @ uncertainty)[:, 0] * phi).sum(axis=1)
     return result
 
 

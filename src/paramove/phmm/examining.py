@@ -13,7 +13,7 @@ from paramove.hmm import check_length, checked_sequence
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
-from paramove.phmm.performance import Performances, beginning_features, movement_parts
+from paramove.phmm.performance import Performances, movement_parts
 
 
 class Examination(NamedTuple):
@@ -23,7 +23,7 @@ class Examination(NamedTuple):
         estimate: of theta.
         outlier_score: distance from the training movements, see `Performances.outlier_score`; of a beginning the
             root of its distance in units of the median one.
-        log_density: of `movement_parts`, or of the features of a beginning.
+        log_density: of `movement_parts`, or of the points of a beginning.
         log_p_value: logarithm of `p_value`.
     """
 
@@ -70,7 +70,7 @@ class ExaminingPHMM(ParametricHMM):
         """The most likely theta, its covariance, and the log-likelihood there, of a movement or of its beginning.
 
         Theta follows from `movement_parts` by generalised least squares. A beginning (`finished=False`) has the frame
-        rate of the training; its log-likelihood is that of `beginning_features`.
+        rate of the training; its log-likelihood is that of its points.
         """
         if not finished:
             return self.examine(sequence, finished=False).estimate
@@ -94,14 +94,9 @@ class ExaminingPHMM(ParametricHMM):
         if model is not self:
             return model.examine(recorded, finished=finished)
         if not finished:
-            n_frames, regression = self.performances_.beginning(len(recorded))
-            features = beginning_features(recorded, n_frames)
-            theta, covariance = regression.estimate(features, self.search_margin)
-            distance = regression.distance(features, theta)
-            density = regression.log_density(distance)
-            outlier_score = float(np.sqrt(distance / (np.median(regression.distances) + 1e-9)))
-            estimate = ParameterEstimate(theta, covariance, density)
-            return Examination(estimate, outlier_score, density, regression.log_p_value(distance))
+            found = self.performances_.examined_beginning(recorded, self.search_margin)
+            estimate = ParameterEstimate(found.theta, found.covariance, found.log_density)
+            return Examination(estimate, found.outlier_score, found.log_density, found.log_p_value)
         estimate, parts = self._estimated(recorded, self.performances_)
         nearest = self.performances_.complete.estimate(parts, self.search_margin)[0]
         distance = self.performances_.complete.distance(parts, nearest)

@@ -12,19 +12,16 @@ from numpy.typing import ArrayLike
 
 from paramove.documents import Floats, Ints
 from paramove.hmm import resample
+from paramove.phmm.beginnings import Beginnings, ExaminedBeginning
 from paramove.phmm.correlated_regression import CorrelatedRegression
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, distances_with_noise, moving_average
 from paramove.phmm.predictive_distribution import PredictiveDistribution
 
-FIRST_FRAMES, GROWTH = 5, 1.25
-"""Beginnings are modelled at 5 frames and then at every length a quarter longer."""
-BEGINNING_POINTS = 5
 PARTS, PART_FRAMES = 5, 20
 """A complete movement is described by the means of its fifths, of 20 interpolated frames each, and its last frame."""
 LATE_ROWS = 2
 """Rows of that description that alone may predict theta better: of movements that end at their target."""
-BEGINNING_SHRINKAGES = (0.1, 0.3)
 OUTLIER_SHRINKAGE = 0.5
 """What estimates theta best may take nearly all correlations for chance; then movements of another kind pass."""
 PACE_PARTS, PACE_SHRINKAGE, PACE_WEIGHT = 10, 0.1, 0.35
@@ -81,18 +78,18 @@ class Pace:
 
 @dataclass(frozen=True)
 class Performances:
-    """Correlated regressions of complete movements (in parts) and of beginnings of n frames.
+    """Correlated regressions of complete movements (in parts) and of beginnings.
 
     Attributes:
         complete: of `movement_parts`, for outliers.
         estimating: of all or the last rows of that, whichever predicts theta of left-out groups better.
-        beginnings: number of frames, increasing, with the regression of `beginning_features`.
+        beginnings: of movements that go on.
         pace: of complete movements.
         noise: beyond that of the training that is expected of sequences.
     """
 
     complete: CorrelatedRegression
-    beginnings: tuple[tuple[int, CorrelatedRegression], ...]
+    beginnings: Beginnings
     pace: Pace
     estimating: CorrelatedRegression
     noise: AddedNoise | None = None
@@ -105,18 +102,9 @@ class Performances:
         complete = CorrelatedRegression.fitted(parts, theta, monomials, groups, shrinkages=(OUTLIER_SHRINKAGE,))
         estimating, error = CorrelatedRegression.fitted_with_error(parts, theta, monomials, groups, complete.ridge)
         late, late_error = CorrelatedRegression.fitted_with_error(last, theta, monomials, groups)
-        lengths = np.array([len(sequence) for sequence in sequences])
-        beginnings = []
-        for n_frames in beginning_lengths(lengths):
-            long = np.flatnonzero(lengths >= n_frames)
-            y = np.stack([beginning_features(sequences[k], n_frames) for k in long.tolist()])
-            beginnings.append(
-                (n_frames, CorrelatedRegression.fitted(
-                    y, theta[long], monomials, groups[long], complete.ridge, BEGINNING_SHRINKAGES
-                ))
-            )  # fmt: skip
+        beginnings = Beginnings.fitted(sequences, theta, monomials, groups, complete.ridge)
         pace = Pace.fitted(sequences, groups)
-        return cls(complete, tuple(beginnings), pace, late if late_error < error else estimating)
+        return cls(complete, beginnings, pace, late if late_error < error else estimating)
 
     def expecting(self, noise: AddedNoise) -> Performances:
         """The same for a sequence with noise."""
@@ -153,28 +141,16 @@ class Performances:
         known = np.log(_outlier_score(distances, paces, distances, paces) + 1e-9)
         return PredictiveDistribution.of(known, self.complete.groups)
 
-    def beginning(self, n_frames: int) -> tuple[int, CorrelatedRegression]:
-        """The longest modelled beginning of at most this many frames. Raises ValueError where that is too short."""
-        known = [one for one in self.beginnings if one[0] <= n_frames]
-        if not known:
-            raise ValueError(
-                f"a beginning has at least {FIRST_FRAMES} frames, found {n_frames}: wait for more of the movement"
-            )
-        if self.noise is None:
-            return known[-1]
-        length, regression = known[-1]
-        noise = replace(self.noise, sequence=self.noise.sequence[:length], n_frames=None)
-        return length, regression.widened(noise.of_averages(lambda frames: beginning_features(frames, length)))
+    def examined_beginning(self, sequence: Floats, margin: float) -> ExaminedBeginning:
+        """See `Beginnings.examined`."""
+        return self.beginnings.examined(sequence, margin, self.noise and replace(self.noise, n_frames=None))
 
     def arrays(self) -> dict[str, Floats]:
         """Everything learned, for a file."""
         result = {f"complete_{name}": value for name, value in self.complete.arrays().items()}
         result |= {f"estimating_{name}": value for name, value in self.estimating.arrays().items()}
         result |= {"pace_mean": self.pace.mean, "pace_root": self.pace.root, "pace_distances": self.pace.distances}
-        result["beginning_frames"] = np.array([float(n_frames) for n_frames, _ in self.beginnings])
-        for number, (_, regression) in enumerate(self.beginnings):
-            result |= {f"beginning{number}_{name}": value for name, value in regression.arrays().items()}
-        return result
+        return result | self.beginnings.arrays()
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, Floats], monomials: Monomials) -> Performances:
@@ -186,10 +162,7 @@ class Performances:
                 f"expected estimating_coefficients of at most {len(complete.coefficients)} rows, found "
                 f"{len(estimating.coefficients)}"
             )
-        beginnings = tuple(
-            (int(n_frames), CorrelatedRegression.from_arrays(arrays, f"beginning{number}_", monomials))
-            for number, n_frames in enumerate(arrays["beginning_frames"])
-        )
+        beginnings = Beginnings.from_arrays(arrays, monomials)
         pace = Pace(arrays["pace_mean"], arrays["pace_root"], arrays["pace_distances"])
         expected = {"pace_mean": (PACE_PARTS,), "pace_root": (PACE_PARTS, PACE_PARTS)}
         expected["pace_distances"] = complete.distances.shape
@@ -256,21 +229,6 @@ def movement_parts(sequence: Floats) -> Floats:
     frames = resample(sequence, PARTS * PART_FRAMES)
     means = frames.reshape(PARTS, PART_FRAMES, -1).mean(axis=1)
     return np.concatenate([means, frames[-1:]]).ravel()
-
-
-def beginning_lengths(lengths: Ints) -> list[int]:
-    """Numbers of frames at which beginnings are modelled: at least half of the movements last that long."""
-    result, n_frames = [], float(FIRST_FRAMES)
-    while n_frames <= np.median(lengths):
-        result.append(round(n_frames))
-        n_frames *= GROWTH
-    return sorted(set(result))
-
-
-def beginning_features(sequence: ArrayLike, n_frames: int) -> Floats:
-    """First frame of a movement and increments over its first frames. Shape (5 D,)."""
-    points = resample(np.asarray(sequence, dtype=np.float64)[:n_frames], BEGINNING_POINTS)
-    return np.concatenate([points[:1], np.diff(points, axis=0)]).ravel()
 
 
 def groups_of(groups: ArrayLike | None, theta: Floats) -> Ints:

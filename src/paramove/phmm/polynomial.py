@@ -147,7 +147,7 @@ class PolynomialPHMM(ExaminingPHMM):
 
         With independent residuals the maximum of the likelihood, by EM (3.5), generalised where means are not linear.
         With correlated ones theta follows from `movement_parts`, by generalised least squares. A beginning
-        (`finished=False`) has the frame rate of the training; its log-likelihood is that of `beginning_features`.
+        (`finished=False`) has the frame rate of the training; its log-likelihood is that of its points.
         """
         if not finished or self.performances_ is not None:
             return super().estimate(sequence, finished=finished)

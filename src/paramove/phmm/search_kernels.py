@@ -297,11 +297,15 @@ def nearest(
 
 @compiled
 def all_nearest(
-    starts: Floats, bound: float, exponents: Ints, units: Floats, rights: Floats, triangle: Floats, max_steps: int
+    starts: Floats, bound: float, exponents: Ints, units: Floats, rights: Floats, triangles: Floats, max_steps: int
 ) -> tuple[Floats, Floats]:
-    """`nearest` of every row of `rights` (K, F). Shapes (K, P) and (K, F, P)."""
-    n_features, n_components = triangle.shape[0], exponents.shape[1]
+    """`nearest` of every row of `rights` (K, F) with its triangle, or the only one, (K or 1, F, F).
+
+    Shapes (K, P) and (K, F, P).
+    """
+    n_features, n_components = triangles.shape[1], exponents.shape[1]
     positions, slopes = np.empty((len(rights), n_components)), np.empty((len(rights), n_features, n_components))
     for k in range(len(rights)):
+        triangle = triangles[min(k, len(triangles) - 1)]
         positions[k], slopes[k] = nearest(starts, bound, exponents, units, rights[k], triangle, max_steps)
     return positions, slopes

@@ -1,0 +1,153 @@
+"""Distribution of movements that go on: where in the movement a beginning ends is unknown, as theta is.
+
+For each of many fractions a regression knows how the beginnings of that fraction depend on theta. With the time that
+has passed, the durations of the training leave some fractions possible. Theta of a beginning is averaged over these, by
+how likely they are. Neighbouring points repeat each other, so all together count as a few independent ones only;
+otherwise the average would follow one fraction at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import softmax
+
+from paramove.documents import Floats, Ints
+from paramove.hmm import resample
+from paramove.phmm.correlated_regression import CondensedRegressions, CorrelatedRegression
+from paramove.phmm.features import Monomials
+from paramove.phmm.noise import AddedNoise
+
+FIRST_FRAMES = 5
+FRACTIONS = tuple(np.linspace(0.1, 1.0, 20).tolist())
+COMPARED = (5, 9, 14)
+"""Numbers of the fractions by whose beginnings their description is chosen: about 0.3, 0.5 and 0.75."""
+POINTS = 6
+INDEPENDENT_NUMBERS = 4.0
+"""As how many independent numbers a beginning counts where fractions are compared."""
+SHRINKAGES = (0.02, 0.1, 0.3)
+DURATION_MARGIN = 0.2
+"""How much shorter or longer than those of the training a movement may be, as a difference of logarithms."""
+
+
+class ExaminedBeginning(NamedTuple):
+    """Theta (P,), its covariance (P, P); of the likeliest fraction the density, outlier score and log p-value."""
+
+    theta: Floats
+    covariance: Floats
+    log_density: float
+    outlier_score: float
+    log_p_value: float
+
+
+@dataclass(frozen=True)
+class Beginnings:
+    """Regressions of beginnings of movements.
+
+    Attributes:
+        regressions: of `points_of`, one for each of `FRACTIONS`.
+        increments: whether a beginning is described by increments of its points or by the points themselves.
+        log_durations: minimum and maximum of the training, logarithms of frames.
+    """
+
+    regressions: tuple[CorrelatedRegression, ...]
+    increments: bool
+    log_durations: tuple[float, float]
+
+    @classmethod
+    def fitted(
+        cls, sequences: Sequence[Floats], theta: Floats, monomials: Monomials, groups: Ints, ridge: tuple[float, ...]
+    ) -> Beginnings:
+        """From movements as recorded, labels (K, P), groups (K,) and the regularisation of complete movements.
+
+        Points or increments, whichever predict theta of left-out groups better: what shrinkage takes for chance
+        depends on it. People begin where they are, and direct the increments; scripts and robots pass their points.
+        """
+
+        def of(number: int, increments: bool) -> tuple[CorrelatedRegression, float]:
+            y = np.stack([points_of(x[: _n_frames(len(x), FRACTIONS[number])], increments) for x in sequences])
+            return CorrelatedRegression.fitted_with_error(y, theta, monomials, groups, ridge, SHRINKAGES)
+
+        compared = {increments: [of(number, increments) for number in COMPARED] for increments in (True, False)}
+        error = {increments: sum(np.log(one) for _, one in results) for increments, results in compared.items()}
+        increments = not error[False] < error[True]
+        known = dict(zip(COMPARED, compared[increments], strict=True))
+        regressions = [(known.get(number) or of(number, increments))[0] for number in range(len(FRACTIONS))]
+        lengths = np.log([len(sequence) for sequence in sequences])
+        return cls(tuple(regressions), increments, (float(lengths.min()), float(lengths.max())))
+
+    def examined(self, sequence: Floats, margin: float, noise: AddedNoise | None = None) -> ExaminedBeginning:
+        """A beginning (T, D), with noise beyond that of the training; `margin` as `CorrelatedRegression.estimate`.
+
+        Raises ValueError for a beginning of fewer than 5 frames.
+        """
+        if len(sequence) < FIRST_FRAMES:
+            raise ValueError(
+                f"a beginning has at least {FIRST_FRAMES} frames, found {len(sequence)}: wait for more of the movement"
+            )
+        durations = np.log(len(sequence)) - np.log(FRACTIONS)
+        shortest, longest = self.log_durations
+        possible = np.flatnonzero((durations > shortest - DURATION_MARGIN) & (durations < longest + DURATION_MARGIN))
+        if not len(possible):  # it lasts longer than all movements, or has hardly begun
+            possible = np.array([int(np.abs(durations - np.clip(durations, shortest, longest)).argmin())])
+        chosen = slice(int(possible[0]), int(possible[-1]) + 1)
+        regressions, condensed = self.regressions[chosen], self._condensed.part(chosen)
+        if noise is not None:
+            added = noise.of_averages(lambda frames: points_of(frames, self.increments))
+            regressions = tuple(one.widened(added) for one in regressions)
+            condensed = CondensedRegressions.of(regressions)
+        y = points_of(sequence, self.increments)[None]
+        theta, covariances = condensed.estimates(y, margin)
+        distances = condensed.distances_from(y, theta)
+        densities = condensed.log_norms - 0.5 * distances
+        evidence = densities + 0.5 * np.linalg.slogdet(covariances)[1]
+        weights = softmax(evidence * INDEPENDENT_NUMBERS / y.shape[1])
+        mean = weights @ theta
+        missed = theta - mean
+        covariance = np.einsum("k,kpq->pq", weights, covariances) + (weights * missed.T) @ missed
+        best = int(weights.argmax())
+        usual = float(np.median(regressions[best].distances)) + 1e-9
+        return ExaminedBeginning(
+            mean, covariance, float(densities[best]), float(np.sqrt(distances[best] / usual)),
+            regressions[best].log_p_value(float(distances[best])),
+        )  # fmt: skip
+
+    @cached_property
+    def _condensed(self) -> CondensedRegressions:
+        return CondensedRegressions.of(self.regressions)
+
+    def arrays(self) -> dict[str, Floats]:
+        """Everything learned, for a file."""
+        result = {"beginnings": np.array([float(self.increments), *self.log_durations])}
+        for number, regression in enumerate(self.regressions):
+            result |= {f"beginning{number}_{name}": value for name, value in regression.arrays().items()}
+        return result
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, Floats], monomials: Monomials) -> Beginnings:
+        """From the result of `arrays`. Raises KeyError for a missing array, ValueError for shapes that do not fit."""
+        regressions = tuple(
+            CorrelatedRegression.from_arrays(arrays, f"beginning{number}_", monomials)
+            for number in range(len(FRACTIONS))
+        )
+        scalars, lengths = arrays["beginnings"], {len(one.coefficients) for one in regressions}
+        if scalars.shape != (3,) or len(lengths) != 1:
+            raise ValueError(
+                f"expected 3 numbers in beginnings and regressions of one length, found {scalars.shape} and {lengths}"
+            )
+        return cls(regressions, bool(scalars[0]), (float(scalars[1]), float(scalars[2])))
+
+
+def points_of(sequence: ArrayLike, increments: bool) -> Floats:
+    """Six points of a beginning at equal times, or the first and the increments between them. Shape (6 D,)."""
+    points = resample(np.asarray(sequence, dtype=np.float64), POINTS)
+    return (np.concatenate([points[:1], np.diff(points, axis=0)]) if increments else points).ravel()
+
+
+def _n_frames(length: int, fraction: float) -> int:
+    return max(FIRST_FRAMES, round(fraction * length))
