@@ -271,21 +271,27 @@ def regions(out: Path) -> dict[str, Any]:
     found = []
     for name in ("few", "real"):
         for task, rows in load(out / f"{name}.json").items():
-            own, plain, ridge = (
+            own, plain, ridge, moving = (
                 {key: one["value"] for key, one in rows.get(row, {}).get("measures", {}).items()}
                 for row in (
                     "paramove, quadratic PHMM",
                     "paramove, quadratic PHMM as in the thesis",
                     "ridge from all frames",
+                    "ridge from position and velocity",
                 )
             )
             if "covered_50" not in own:
                 continue
             factor, unit = (1.0, "°") if task.startswith("pointing") else (10.0, " mm")
-            theta, by_ridge = (f"{factor * one['theta']:.2f}{unit}" if "theta" in one else "–" for one in (own, ridge))
+            theta, by_ridge = (f"{factor * one['theta']:.2f}{unit}" for one in (own, ridge))
+            after, moving_after = (
+                ", ".join(f"{factor * one[f'theta_{percent}']:.3g}" for percent in (25, 50, 75)) + unit
+                for one in (own, moving)
+            )
             keys = ("covered_50", "covered_80", "covered", "covered_set", "below_1", "below_5", "below_20")
             found.append(
                 {"task": task, "theta": theta, "ridge": by_ridge, "independent": plain.get("covered")}
+                | {"after": after, "moving_after": moving_after}
                 | {key: own[key] for key in keys}
             )
     return {"tasks": found}
@@ -495,8 +501,8 @@ MEASUREMENTS = {
         (
             "python -m studies peers --on few --jobs 2 --method 'quadratic PHMM' --method 'ridge from' --out {out}/1"
             " --json {out}/few.json",
-            "python -m studies real --jobs 2 --method 'quadratic PHMM' --task pointing --task table/reach"
-            " --task table/drink --out {out}/2 --json {out}/real.json",
+            "python -m studies peers --on real --jobs 2 --method 'quadratic PHMM' --method 'ridge from' --task pointing"
+            " --task table/reach --task table/drink --out {out}/2 --json {out}/real.json",
         ),
         regions,
         "10 minutes",

@@ -61,10 +61,10 @@ class References:
 
     def _empty(self) -> LeftRightHMM:
         model = self.model
-        return LeftRightHMM(model.n_states, model.d_min, model.d_max, options=self._options())
+        return LeftRightHMM(model.n_states, model.d_min_, model.d_max_, options=self._options())
 
     def _resampled(self, sequence: Floats) -> Floats:
-        frames = self.model.resampled_frames
+        frames = self.model.resampled_frames_
         return sequence if frames is None else resample(sequence, frames)
 
 

@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+import pickle
+from copy import deepcopy
 from pathlib import Path
 
+import joblib
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from sklearn.base import clone
-from sklearn.model_selection import GridSearchCV, KFold, cross_val_score
+from sklearn.base import clone, is_regressor
+from sklearn.exceptions import NotFittedError
+from sklearn.metrics import r2_score
+from sklearn.model_selection import GridSearchCV, KFold, cross_val_predict, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
+from sklearn.utils.validation import check_is_fitted
 
+from paramove.hmm import NotFittedError as OurNotFittedError
 from paramove.hmm import SequenceLengthError
-from paramove.phmm import InterpolativePHMM, LinearPHMM, ModelFileError, ParametricHMM, QuadraticPHMM
+from paramove.phmm import (
+    InterpolativePHMM,
+    LinearPHMM,
+    ModelFileError,
+    MovementClassifier,
+    ParametricHMM,
+    QuadraticPHMM,
+)
 from tests.phmm.movements import CLASSES, shown, trained, untrained, wave
 
 every_class = pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__name__)
@@ -68,10 +84,17 @@ def test_no_demonstrations_are_refused(kind: type[ParametricHMM]) -> None:
 
 
 @every_class
-@pytest.mark.parametrize("labels", [np.zeros((3, 2)), np.full((36, 2), np.nan), np.zeros((36, 2, 2))])
+@pytest.mark.parametrize("labels", [np.zeros((3, 2)), np.zeros((36, 2, 2)), np.zeros((36, 0))])
 def test_labels_that_do_not_fit_are_refused(kind: type[ParametricHMM], labels: np.ndarray) -> None:
-    with pytest.raises(ValueError, match=r"theta has one finite row per sequence: expected shape \(36, P\)"):
+    with pytest.raises(ValueError, match=r"theta has one row per sequence: expected shape \(36, P\)"):
         untrained(kind).fit(shown(0)[0], labels)
+
+
+def test_a_theta_that_is_not_finite_is_named() -> None:
+    sequences, theta = shown(0)
+    theta[[7, 9], 1] = np.nan
+    with pytest.raises(ValueError, match=r"found \[.*nan\] for sequence 7, 2 in all"):
+        LinearPHMM().fit(sequences, theta)
 
 
 @every_class
@@ -164,12 +187,74 @@ def test_scikit_learn_selects_models(kind: type[ParametricHMM]) -> None:
     assert np.isfinite(scores).all()
     search = GridSearchCV(untrained(kind), {"n_states": [7, 8]}, cv=folds, error_score="raise").fit(sequences, theta)
     assert search.best_params_["n_states"] in (7, 8)
-    assert_allclose(
-        search.best_estimator_.score(sequences, theta),
-        np.mean([search.best_estimator_.log_likelihood(x, one) for x, one in zip(sequences, theta, strict=True)]),
-        rtol=1e-12,
-        atol=0.0,
-    )
+    best = search.best_estimator_
+    found, covariances = best.predict(sequences, return_cov=True)
+    assert covariances.shape == (len(sequences), 2, 2)
+    assert_allclose(best.score(sequences, theta), r2_score(theta, found), rtol=1e-12, atol=0.0)
+    assert best.score(sequences, theta) > 0.9
+
+
+@every_class
+def test_the_script_of_a_scikit_learn_user_runs(kind: type[ParametricHMM], tmp_path: Path) -> None:
+    sequences, theta = shown(3, lines=2, repetitions=4)
+    folds = KFold(2, shuffle=True, random_state=2)
+    search = GridSearchCV(kind(), {"n_states": np.array([5, 10])}, cv=folds, error_score="raise")
+    search.fit(sequences, theta)  # states last as long as 100 frames allow
+    assert is_regressor(kind())
+    pipeline = make_pipeline(FunctionTransformer(lambda X: [2.0 * x for x in X]), kind(10))
+    predicted = cross_val_predict(pipeline, sequences, theta, cv=folds)
+    assert np.abs(predicted - theta).mean() < 0.1
+    model = search.best_estimator_
+    model.save(tmp_path / "model.npz")  # a number of numpy's becomes a plain one
+    joblib.dump(model, tmp_path / "model.joblib")
+    for again in (joblib.load(tmp_path / "model.joblib"), ParametricHMM.load(tmp_path / "model.npz"), deepcopy(model)):
+        assert np.array_equal(again.predict(sequences), model.predict(sequences))
+    flat = kind().fit(sequences, theta[:, 0])
+    flat.save(tmp_path / "flat.npz")
+    assert flat.predict(sequences).shape == ParametricHMM.load(tmp_path / "flat.npz").predict(sequences).shape == (16,)
+    assert flat.score(sequences, theta[:, 0]) > 0.8
+    assert kind().fit(sequences, theta[:, :1]).predict(sequences).shape == (16, 1)
+
+
+def test_durations_of_states_follow_from_the_frames() -> None:
+    assert (LinearPHMM().d_min_, LinearPHMM().d_max_, LinearPHMM().resampled_frames_) == (4, 6, 100)
+    assert (LinearPHMM(7).d_min_, LinearPHMM(7).d_max_) == (11, 18)
+    assert LinearPHMM(300).d_min_ == 1
+    assert LinearPHMM(8, 4, 6).resampled_frames_ is None
+    assert LinearPHMM(8, resampled_frames=40).d_max_ == 6
+    with pytest.raises(ValueError, match="both d_min and d_max or none of them, found 4 and None"):
+        LinearPHMM(8, 4).fit(*shown(0))
+    with pytest.raises(ValueError, match="at least one state, found 0"):
+        LinearPHMM(0).fit(*shown(0))
+
+
+def test_an_untrained_model_is_reported_as_scikit_learn_does() -> None:
+    model = LinearPHMM()
+    with pytest.raises(NotFittedError) as caught:
+        model.predict([UNSEEN])
+    assert isinstance(caught.value, OurNotFittedError)
+    assert isinstance(pickle.loads(pickle.dumps(caught.value)), NotFittedError)
+    for ask in (model.estimate, lambda x: model.score([x], [[0.0]]), lambda x: MovementClassifier().classify(x)):
+        with pytest.raises(NotFittedError):
+            ask(UNSEEN)
+    with pytest.raises(NotFittedError):
+        check_is_fitted(model)
+    with pytest.raises(ValueError, match="at least 2"):
+        model.fit([np.zeros((1, 3))] * 4, [[0.0], [1.0], [2.0], [3.0]])
+    with pytest.raises(NotFittedError):
+        model.estimate(UNSEEN)
+    check_is_fitted(LinearPHMM().fit(*shown(0)))
+
+
+def test_texts_and_clones_have_what_was_given() -> None:
+    assert repr(QuadraticPHMM(7, residuals="independent")) == "QuadraticPHMM(n_states=7, residuals='independent')"
+    assert repr(LinearPHMM()) == "LinearPHMM()"
+    classifier = clone(MovementClassifier(QuadraticPHMM(7)))
+    assert classifier.get_params()["model__n_states"] == 7
+    classifier.set_params(model__n_states=9)
+    assert classifier.model.n_states == 9
+    with pytest.raises(ValueError, match="found 'states'"):
+        classifier.set_params(states=3)
 
 
 @every_class

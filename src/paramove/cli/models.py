@@ -115,8 +115,8 @@ def _facts(file: Path, model: ParametricHMM) -> dict[str, Any]:
             for name, low, high in zip(parameter_names(model), *low_high, strict=True)
         },
         "states": model.n_states,
-        "frames_per_state": [model.d_min, model.d_max],
-        "resampled_frames": model.resampled_frames,
+        "frames_per_state": [model.d_min_, model.d_max_],
+        "resampled_frames": model.resampled_frames_,
         "state_durations": seconds.tolist(),
         "state_durations_unit": unit,
         "duration_s": about.duration or None,

@@ -22,6 +22,7 @@ from .left_right import LeftRightHMM as LeftRightHMM
 from .options import TrainingOptions as TrainingOptions
 from .options import TrainingSummary as TrainingSummary
 from .rejection import LikelihoodTest as LikelihoodTest
+from .sequences import NotFittedError as NotFittedError
 from .sequences import SequenceLengthError as SequenceLengthError
 from .sequences import Stack as Stack
 from .sequences import check_demonstrations as check_demonstrations
@@ -29,6 +30,7 @@ from .sequences import check_length as check_length
 from .sequences import checked_sequence as checked_sequence
 from .sequences import checked_sequences as checked_sequences
 from .sequences import interpolate as interpolate
+from .sequences import not_fitted as not_fitted
 from .sequences import resample as resample
 from .synthesis import Path as Path
 from .synthesis import Timing as Timing

@@ -28,6 +28,7 @@ from paramove.hmm.sequences import (
     check_demonstrations,
     checked_sequence,
     checked_sequences,
+    not_fitted,
 )
 from paramove.hmm.training import iterate
 from paramove.hmm.viterbi import best_path
@@ -93,7 +94,7 @@ class GaussianHMM:
 
     @property
     def parameters(self) -> ChainParameters:
-        """All parameters together. Raises RuntimeError before training."""
+        """All parameters together. Raises NotFittedError before training."""
         return self._ready().parameters
 
     @property
@@ -241,7 +242,7 @@ class GaussianHMM:
 
     def _ready(self) -> ChainEvaluator:
         if self._evaluator is None:
-            raise RuntimeError("this HMM has no parameters yet: call fit or with_parameters")
+            raise not_fitted("this HMM has no parameters yet: call fit or with_parameters")
         return self._evaluator
 
     def _stacked(self, sequence: ArrayLike) -> Stack:

@@ -18,6 +18,7 @@ from paramove.hmm.sequences import (
     check_length,
     checked_sequence,
     checked_sequences,
+    not_fitted,
 )
 from paramove.hmm.training import equal_segments, train
 
@@ -74,9 +75,9 @@ class LeftRightHMM:
 
     @property
     def parameters(self) -> Parameters:
-        """Means, covariances and durations together. Raises RuntimeError before training."""
+        """Means, covariances and durations together. Raises NotFittedError before training."""
         if self._parameters is None:
-            raise RuntimeError("this HMM has no parameters yet: call fit, or use from_parameters")
+            raise not_fitted("this HMM has no parameters yet: call fit, or use from_parameters")
         return self._parameters
 
     @property

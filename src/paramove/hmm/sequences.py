@@ -1,7 +1,9 @@
 """Checks and resampling of sequences."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +13,20 @@ from paramove.documents import Floats, Ints
 CACHED_VALUES = 1 << 16
 LARGEST = 1e100
 MIN_RANGE = 1e-100
+
+
+class NotFittedError(RuntimeError, ValueError, AttributeError):
+    """A model is used before it was trained."""
+
+    def __reduce__(self) -> tuple[Any, tuple[str]]:
+        """A worker of joblib raises it in its own process."""
+        return not_fitted, (str(self),)
+
+
+def not_fitted(message: str) -> NotFittedError:
+    """The error, which is also scikit-learn's if that is in use."""
+    theirs = getattr(sys.modules.get("sklearn.exceptions"), "NotFittedError", None)
+    return NotFittedError(message) if theirs is None else type("NotFittedError", (NotFittedError, theirs), {})(message)
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,11 @@ POINTS = 6
 INDEPENDENT_NUMBERS = 4.0
 """As how many independent numbers a beginning counts where fractions are compared."""
 SHRINKAGES = (0.02, 0.1, 0.3)
-DURATION_MARGIN = 0.2
-"""How much shorter or longer than those of the training a movement may be, as a difference of logarithms."""
+LEAST_DURATION_MARGIN = 0.005
+"""A movement may be shorter or longer than those of the training by the deviation of their durations, and by this."""
+WIDEST_MARGIN, PRIOR_WIDTH = 0.25, 1.5
+"""Theta is searched this far outside the bounds of the training; its prior has a deviation of 1.5 times half their
+distance."""
 
 
 class ExaminedBeginning(NamedTuple):
@@ -52,7 +55,7 @@ class Beginnings:
     Attributes:
         regressions: of `points_of`, one for each of `FRACTIONS`.
         increments: whether a beginning is described by increments of its points or by the points themselves.
-        log_durations: minimum and maximum of the training, logarithms of frames.
+        log_durations: minimum and maximum of the training with a margin, logarithms of frames.
     """
 
     regressions: tuple[CorrelatedRegression, ...]
@@ -79,7 +82,8 @@ class Beginnings:
         known = dict(zip(COMPARED, compared[increments], strict=True))
         regressions = [(known.get(number) or of(number, increments))[0] for number in range(len(FRACTIONS))]
         lengths = np.log([len(sequence) for sequence in sequences])
-        return cls(tuple(regressions), increments, (float(lengths.min()), float(lengths.max())))
+        outside = LEAST_DURATION_MARGIN + float(lengths.std())
+        return cls(tuple(regressions), increments, (float(lengths.min()) - outside, float(lengths.max()) + outside))
 
     def examined(self, sequence: Floats, margin: float, noise: AddedNoise | None = None) -> ExaminedBeginning:
         """A beginning (T, D), with noise beyond that of the training; `margin` as `CorrelatedRegression.estimate`.
@@ -92,9 +96,11 @@ class Beginnings:
             )
         durations = np.log(len(sequence)) - np.log(FRACTIONS)
         shortest, longest = self.log_durations
-        possible = np.flatnonzero((durations > shortest - DURATION_MARGIN) & (durations < longest + DURATION_MARGIN))
-        if not len(possible):  # it lasts longer than all movements, or has hardly begun
-            possible = np.array([int(np.abs(durations - np.clip(durations, shortest, longest)).argmin())])
+        possible = np.flatnonzero((durations > shortest) & (durations < longest))
+        if not len(possible):  # the next fraction: none is known exactly, or it lasts longer than all movements
+            possible = np.array([max(0, int((durations >= shortest).sum()) - 1)])
+            known = round(FRACTIONS[possible[0]] * np.exp(0.5 * (shortest + longest)))
+            sequence = sequence[: max(FIRST_FRAMES, known)] if durations[-1] < longest else sequence
         chosen = slice(int(possible[0]), int(possible[-1]) + 1)
         regressions, condensed = self.regressions[chosen], self._condensed.part(chosen)
         if noise is not None:
@@ -102,8 +108,11 @@ class Beginnings:
             regressions = tuple(one.widened(added) for one in regressions)
             condensed = CondensedRegressions.of(regressions)
         y = points_of(sequence, self.increments)[None]
-        theta, covariances = condensed.estimates(y, margin)
+        theta, covariances = condensed.estimates(y, min(margin, WIDEST_MARGIN))
         distances = condensed.distances_from(y, theta)
+        prior = np.diag((PRIOR_WIDTH * condensed.monomials.scale) ** -2.0)
+        covariances = np.linalg.inv(np.linalg.inv(covariances) + prior).astype(np.float64)
+        theta -= ((theta - condensed.monomials.centre)[:, None] @ prior @ covariances)[:, 0]
         densities = condensed.log_norms - 0.5 * distances
         evidence = densities + 0.5 * np.linalg.slogdet(covariances)[1]
         weights = softmax(evidence * INDEPENDENT_NUMBERS / y.shape[1])

@@ -12,14 +12,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp
 
 from paramove.documents import Floats, Ints, renamed_attribute
-from paramove.hmm import checked_sequence, checked_sequences, resample
+from paramove.hmm import checked_sequence, checked_sequences, not_fitted, resample
 from paramove.phmm.beginnings import FIRST_FRAMES
 from paramove.phmm.examining import has_p_values
 from paramove.phmm.left_out import fold_numbers
@@ -62,7 +62,7 @@ class MovementClassifier:
 
     Args:
         model: untrained model of every action, or a mapping from actions to untrained models. Without one:
-            `QuadraticPHMM(resampled_frames=100)`.
+            `QuadraticPHMM()`.
 
     Attributes:
         classes_: names of the actions, sorted.
@@ -139,6 +139,22 @@ class MovementClassifier:
         """Fraction of sequences whose action is correct."""
         return float(np.mean(self.predict(sequences, finished=finished) == np.asarray(labels)))
 
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Constructor arguments, and as `model__name` those of the model, as scikit-learn expects."""
+        nested = self.model.get_params() if deep and isinstance(self.model, ParametricHMM) else {}
+        return {"model": self.model} | {f"model__{name}": value for name, value in nested.items()}
+
+    def set_params(self, **parameters: Any) -> Self:
+        """Change constructor arguments. Raises ValueError for an unknown name."""
+        self.model = parameters.pop("model", self.model)
+        for name, value in parameters.items():
+            if not name.startswith("model__") or not isinstance(self.model, ParametricHMM):
+                raise ValueError(
+                    f"a {type(self).__name__} has the parameters {sorted(self.get_params())}, found {name!r}"
+                )
+            self.model.set_params(**{name.removeprefix("model__"): value})
+        return self
+
     def save(self, folder: str | Path) -> None:
         """Write a folder with a model file per action, each usable alone, and an index."""
         path = Path(folder)
@@ -178,12 +194,12 @@ class MovementClassifier:
                 raise ValueError(f"there are models for {sorted(self.model)}, found sequences of {action!r}")
             return self.model[action]
         if self.model is None:
-            return QuadraticPHMM(resampled_frames=100)
+            return QuadraticPHMM()
         return type(self.model)(**self.model.get_params())
 
     def _trained(self) -> dict[str, ParametricHMM]:
         if not self.models_:
-            raise RuntimeError("this classifier is not trained yet: call fit, or load a folder")
+            raise not_fitted("this classifier is not trained yet: call fit, or load a folder")
         return self.models_
 
     def _discriminant(self, n_frames: int) -> BeginningDiscriminant:
@@ -209,7 +225,7 @@ def _result(model: ParametricHMM, sequence: Floats, finished: bool) -> tuple[Par
         return examination.estimate, examination.log_p_value, examination.p_value
     estimate = model.estimate(sequence, finished=finished)
     # Neighbouring frames are redundant: the frames of a state count as one.
-    frames = model.resampled_frames if model.resampled_frames is not None else len(sequence)
+    frames = model.resampled_frames_ or len(sequence)
     return estimate, estimate.log_likelihood * model.n_states / frames, 1.0
 
 

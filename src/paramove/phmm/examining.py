@@ -119,7 +119,7 @@ class ExaminingPHMM(ParametricHMM):
     def _checked(self, sequence: ArrayLike) -> Floats:
         self._check_trained()
         checked = self._resampled(checked_sequence(sequence, self.covariances_.shape[-1]))
-        check_length(len(checked), self.n_states, self.d_min, self.d_max)
+        check_length(len(checked), self.n_states, self.d_min_, self.d_max_)
         return checked
 
     def _checked_theta(self, theta: ArrayLike) -> Floats:
@@ -129,7 +129,3 @@ class ExaminingPHMM(ParametricHMM):
         if values.shape[-1:] != (n_components,) or values.ndim > 2 or not np.isfinite(values).all():
             raise ValueError(f"theta has {n_components} finite components, found shape {values.shape}: {values}")
         return values
-
-    def _check_trained(self) -> None:
-        if not hasattr(self, "monomials_"):
-            raise RuntimeError("this model is not trained yet: call fit, or load a file")

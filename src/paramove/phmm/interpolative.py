@@ -56,8 +56,8 @@ class InterpolativePHMM(ParametricHMM):
     def __init__(
         self,
         n_states: int = 20,
-        d_min: int = 4,
-        d_max: int = 6,
+        d_min: int | None = None,
+        d_max: int | None = None,
         *,
         options: TrainingOptions | None = None,
         resampled_frames: int | None = None,
@@ -98,7 +98,7 @@ class InterpolativePHMM(ParametricHMM):
     def local_models(self) -> list[Parameters]:
         """The local HMMs in the order of `grid_.points()`."""
         stored = zip(self.means_, self.covariances_, self.durations_, strict=True)
-        return [Parameters(means, covariances, durations, self.d_min) for means, covariances, durations in stored]
+        return [Parameters(means, covariances, durations, self.d_min_) for means, covariances, durations in stored]
 
     def calibrate(self, sequences: Sequence[ArrayLike], theta: ArrayLike) -> Self:
         """Set `covariance_inflation` so that covariances of `estimate` match its errors on labelled sequences.
@@ -122,7 +122,7 @@ class InterpolativePHMM(ParametricHMM):
         grid = self._grid_for(data.theta)
         groups = grouped(data.sequences, data.theta, grid)
         options = self._training_options()
-        everything = LeftRightHMM(self.n_states, self.d_min, self.d_max, options=options).fit(data.sequences)
+        everything = LeftRightHMM(self.n_states, self.d_min_, self.d_max_, options=options).fit(data.sequences)
         local = synchronised(everything.parameters, groups, options, self.local_iterations)
         self.training_ = everything.training_
         self._set_local(grid, local)
@@ -191,7 +191,7 @@ class InterpolativePHMM(ParametricHMM):
             )
         recorded = checked_sequence(sequence, self._learned_dimensions())
         checked = self._resampled(recorded)
-        check_length(len(checked), self.n_states, self.d_min, self.d_max)
+        check_length(len(checked), self.n_states, self.d_min_, self.d_max_)
         model = self._expecting_noise_of(recorded)
         if model is not self:
             return model.estimate(recorded)
@@ -230,7 +230,7 @@ class InterpolativePHMM(ParametricHMM):
                 row[: len(line)] = line
             flat = np.ascontiguousarray(self.covariances_.reshape(*self.covariances_.shape[:2], -1))
             means, durations = np.ascontiguousarray(self.means_), np.ascontiguousarray(self.durations_)
-            self._prepared = knots, np.array(grid.shape, dtype=np.int64), means, flat, durations, self.d_min
+            self._prepared = knots, np.array(grid.shape, dtype=np.int64), means, flat, durations, self.d_min_
         return self._prepared
 
     def _sensitivity(self, coordinates: Floats, cell: Ints, n_frames: int) -> Sensitivity:
@@ -248,10 +248,6 @@ class InterpolativePHMM(ParametricHMM):
         result: Floats = (vectors / np.maximum(values, 1.0 / widest**2)) @ vectors.T
         return result
 
-    def _check_trained(self) -> None:
-        if not hasattr(self, "grid_"):
-            raise RuntimeError("this model is not trained yet: call fit, or load a file")
-
     def _coordinates(self, theta: ArrayLike) -> Floats:
         values = np.asarray(theta, dtype=np.float64)
         self._check_trained()
@@ -267,7 +263,7 @@ class InterpolativePHMM(ParametricHMM):
         indices, weights = self.grid_.weights(coordinates[None, :], clamped=True)
         covariances = np.tensordot(weights[0], self.covariances_[indices[0]], axes=1)
         durations = np.tensordot(weights[0], self.durations_[indices[0]], axes=1)
-        return Parameters(means, covariances, durations, self.d_min)
+        return Parameters(means, covariances, durations, self.d_min_)
 
     def _at_progress(self, values: Floats, theta: ArrayLike, tau: float | Floats, clamped: bool) -> Floats:
         coordinates = self._coordinates(theta)
@@ -299,12 +295,12 @@ class InterpolativePHMM(ParametricHMM):
         self.durations_ = arrays["durations"]
         dim, theta_dim = self.means_.shape[-1], self.grid_.dimension
         states = (self.grid_.size, self.n_states)
-        expected = {"means": (*states, dim), "covariances": (*states, dim, dim), "durations": (*states, self.d_max)}
+        expected = {"means": (*states, dim), "covariances": (*states, dim, dim), "durations": (*states, self.d_max_)}
         expected |= {"grid_origin": (theta_dim,), "grid_edges": (theta_dim, theta_dim)}
         for name, shape in expected.items():
             if arrays[name].shape != shape:
                 raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
-        check_local_models(self.means_, self.covariances_, self.durations_, self.d_min)
+        check_local_models(self.means_, self.covariances_, self.durations_, self.d_min_)
         self._prepared = None
         known = "spread_factor" in arrays  # models made of given local HMMs have no executions
         self.spread_ = ExecutionCovariance.from_arrays(arrays, self.n_states * dim) if known else None

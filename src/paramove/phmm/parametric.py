@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
+from numbers import Integral
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -26,6 +27,7 @@ from paramove.hmm import (
     check_length,
     checked_sequence,
     checked_sequences,
+    not_fitted,
     resample,
 )
 from paramove.hmm import Path as PathKind
@@ -35,6 +37,7 @@ from paramove.phmm.performance import groups_of
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 
 MAX_FRAMES = 100_000
+DEFAULT_FRAMES, STATE_MARGIN = 100, 0.2
 
 
 class ParameterEstimate(NamedTuple):
@@ -66,14 +69,18 @@ class ParametricHMM(ABC):
     """A family of left-right HMMs lambda^theta (thesis chapter 3); theta in the user's unit, shape (P,).
 
     Args:
-        n_states, d_min, d_max: as in `LeftRightHMM`.
+        n_states, d_min, d_max: as in `LeftRightHMM`. Without d_min and d_max states last as long as the frames allow,
+            up to a fifth shorter or longer.
         options: training options.
-        resampled_frames: if given, every sequence is first resampled to this many frames (thesis 4.1.2.1).
+        resampled_frames: every sequence is first resampled to this many frames (thesis 4.1.2.1). Without it, to 100, or
+            with d_min and d_max to none: they then count recorded frames.
         description: labels that are saved with the model.
 
     Attributes:
+        d_min_, d_max_, resampled_frames_: those in use.
         parameter_bounds_: minimum and maximum theta of the training, shape (2, P).
         training_theta_: the different theta of the training, shape (K, P); None in files of earlier releases.
+        flat_theta_: whether theta of the training was (K,), which `predict` then returns.
         training_noise_: noise of the training; None in files of earlier releases, which then ignore noise.
         training_: summary of the training.
     """
@@ -81,8 +88,8 @@ class ParametricHMM(ABC):
     def __init__(
         self,
         n_states: int = 20,
-        d_min: int = 4,
-        d_max: int = 6,
+        d_min: int | None = None,
+        d_max: int | None = None,
         *,
         options: TrainingOptions | None = None,
         resampled_frames: int | None = None,
@@ -97,7 +104,30 @@ class ParametricHMM(ABC):
         self.parameter_bounds_: Floats | None = None
         self.training_theta_: Floats | None = None
         self.training_noise_: NoiseLevel | None = None
+        self.flat_theta_ = False
         self.training_: TrainingSummary | None = None
+
+    @property
+    def resampled_frames_(self) -> int | None:
+        """Number of frames that every sequence is resampled to; None if sequences keep their own time."""
+        following = self.d_min is None and self.d_max is None
+        return DEFAULT_FRAMES if following and self.resampled_frames is None else self.resampled_frames
+
+    @property
+    def d_min_(self) -> int:
+        """Minimum frames of a state."""
+        return self.d_min if self.d_min is not None else max(1, int((1.0 - STATE_MARGIN) * self._frames_per_state))
+
+    @property
+    def d_max_(self) -> int:
+        """Maximum frames of a state."""
+        return self.d_max if self.d_max is not None else int(np.ceil((1.0 + STATE_MARGIN) * self._frames_per_state))
+
+    @property
+    def _frames_per_state(self) -> float:
+        if (self.d_min is None) != (self.d_max is None):
+            raise ValueError(f"give both d_min and d_max or none of them, found {self.d_min} and {self.d_max}")
+        return (self.resampled_frames_ or DEFAULT_FRAMES) / max(1, self.n_states)
 
     @abstractmethod
     def at(self, theta: ArrayLike) -> LeftRightHMM:
@@ -134,30 +164,42 @@ class ParametricHMM(ABC):
 
         Raises SequenceLengthError for impossible lengths, ValueError for labels or values that do not fit.
         """
+        self._check_counts()
         recorded = checked_sequences(sequences)
         checked = [self._resampled(sequence) for sequence in recorded]
-        labels = np.asarray(theta, dtype=np.float64)
-        labels = labels[:, None] if labels.ndim == 1 else labels
-        if labels.ndim != 2 or len(labels) != len(checked) or not np.isfinite(labels).all():
-            raise ValueError(
-                f"theta has one finite row per sequence: expected shape ({len(checked)}, P), found {labels.shape}"
-            )
+        labels = checked_theta(theta, len(checked))
         floor = self._training_options().floor_deviation
-        check_training(recorded, checked, labels, (self.n_states, self.d_min, self.d_max), floor)
+        check_training(recorded, checked, labels, (self.n_states, self.d_min_, self.d_max_), floor)
+        self._fit(TrainingData(checked, recorded, labels, groups_of(groups, labels)))
         self.parameter_bounds_ = np.stack([labels.min(axis=0), labels.max(axis=0)])
         self.training_theta_ = np.unique(labels, axis=0)
         self.training_noise_ = NoiseLevel.of(recorded)
-        self._fit(TrainingData(checked, recorded, labels, groups_of(groups, labels)))
+        self.flat_theta_ = np.ndim(theta) == 1
         return self
 
     def log_likelihood(self, sequence: ArrayLike, theta: ArrayLike) -> float:
         """ln p(X | lambda^theta)."""
         return self.at(theta).log_likelihood(self._resampled(checked_sequence(sequence)))
 
+    def predict(self, sequences: Sequence[ArrayLike], return_cov: bool = False) -> Floats | tuple[Floats, Floats]:
+        """Theta of many movements, (K, P), or (K,) if labels were; with `return_cov` also covariances (K, P, P)."""
+        self._check_trained()
+        found = [self.estimate(sequence) for sequence in sequences]
+        theta = np.array([one.theta for one in found]).reshape(len(found), -1)
+        theta = theta[:, 0] if self.flat_theta_ else theta
+        return (theta, np.array([one.covariance for one in found])) if return_cov else theta
+
     def score(self, sequences: Sequence[ArrayLike], theta: ArrayLike) -> float:
-        """Mean log-likelihood per sequence, for model selection."""
+        """R² of the predicted theta, the mean over its components, as scikit-learn's regressors have it.
+
+        That of a component with one value for all sequences is 0, or 1 for an exact prediction.
+        """
         labels = np.asarray(theta, dtype=np.float64)
-        return float(np.mean([self.log_likelihood(x, label) for x, label in zip(sequences, labels, strict=True)]))
+        labels = labels.reshape(len(labels), -1)
+        left = ((np.reshape(self.predict(sequences), labels.shape) - labels) ** 2).sum(axis=0)
+        whole = ((labels - labels.mean(axis=0)) ** 2).sum(axis=0)
+        varies = whole > 1e-24 * (labels**2).sum(axis=0)
+        return float(np.where(varies, 1.0 - left / np.where(varies, whole, 1.0), left <= 0.0).mean())
 
     def synthesize(
         self, theta: ArrayLike, n_samples: int | None = None, *, duration: float | None = None,
@@ -206,16 +248,29 @@ class ParametricHMM(ABC):
         return self
 
     def __sklearn_tags__(self) -> Any:
-        """Tags for scikit-learn's model selection, where it is installed: theta is required."""
-        from sklearn.utils import Tags, TargetTags
+        """Tags for scikit-learn's model selection, where it is installed: a regressor of sequences."""
+        from sklearn.utils import InputTags, RegressorTags, Tags, TargetTags
 
-        return Tags(estimator_type=None, target_tags=TargetTags(required=True))
+        targets = TargetTags(required=True, multi_output=True)
+        inputs = InputTags(two_d_array=False, three_d_array=True)
+        return Tags(estimator_type="regressor", target_tags=targets, regressor_tags=RegressorTags(), input_tags=inputs)
+
+    def __sklearn_is_fitted__(self) -> bool:
+        """For scikit-learn's `check_is_fitted`."""
+        return self.parameter_bounds_ is not None
+
+    def __repr__(self) -> str:
+        """The constructor's arguments that differ from their defaults."""
+        defaults = type(self)().get_params()
+        changed = [f"{name}={value!r}" for name, value in self.get_params().items() if value != defaults[name]]
+        return f"{type(self).__name__}({', '.join(changed)})"
 
     def save(self, path: str | Path) -> None:
-        """Write the trained model to one .npz file. Raises RuntimeError before training."""
-        if self.parameter_bounds_ is None:
-            raise RuntimeError("this model has nothing to save yet: call fit first")
-        arrays = {"parameter_bounds": self.parameter_bounds_, **self._arrays()}
+        """Write the trained model to one .npz file. Raises NotFittedError before training."""
+        self._check_trained()
+        arrays = {"parameter_bounds": np.asarray(self.parameter_bounds_), **self._arrays()}
+        if self.flat_theta_:
+            arrays["flat_theta"] = np.ones(1)
         if self.training_theta_ is not None:
             arrays["training_theta"] = self.training_theta_
         if self.training_noise_ is not None:
@@ -241,6 +296,7 @@ class ParametricHMM(ABC):
             arrays = dict(record.arrays)
             model.parameter_bounds_ = arrays.pop("parameter_bounds")
             model.training_theta_ = arrays.pop("training_theta", None)
+            model.flat_theta_ = arrays.pop("flat_theta", None) is not None
             noise = arrays.pop("training_noise", None)
             model.training_noise_ = None if noise is None else NoiseLevel.from_array(noise)
             model._set_arrays(arrays)
@@ -256,7 +312,7 @@ class ParametricHMM(ABC):
         """This model, or if a recorded sequence has more noise than the training, one that expects this noise."""
         noise = None
         if self.training_noise_ is not None:
-            noise = self.training_noise_.added(recorded, self.resampled_frames)
+            noise = self.training_noise_.added(recorded, self.resampled_frames_)
         if noise is None:
             return self
         model = copy(self)
@@ -267,12 +323,16 @@ class ParametricHMM(ABC):
     def _expect(self, noise: AddedNoise) -> None:  # noqa: B027 (a model may leave noise to the likelihood)
         """Expect this noise in sequences; changes a copy of a trained model."""
 
+    def _check_trained(self) -> None:
+        if self.parameter_bounds_ is None:
+            raise not_fitted("this model is not trained yet: call fit, or load a file")
+
     def _check_counts(self) -> None:
-        counts = {name: getattr(self, name) for name in ("n_states", "d_min", "d_max")}
-        if not all(type(count) is int for count in counts.values()) or not 1 <= self.d_min <= self.d_max:
+        counts = {name: getattr(self, name) for name in ("n_states", "d_min_", "d_max_")}
+        if not all(_whole(count) for count in counts.values()) or not 1 <= self.d_min_ <= self.d_max_:
             raise ValueError(f"expected whole numbers with 1 <= d_min <= d_max, found {counts}")
         frames = self.resampled_frames
-        if frames is not None and (type(frames) is not int or not 2 <= frames <= MAX_FRAMES):
+        if frames is not None and (not _whole(frames) or not 2 <= frames <= MAX_FRAMES):
             raise ValueError(f"expected resampled_frames from 2 to {MAX_FRAMES}, found {frames!r:.40}")
         if self.n_states < 1 or not isinstance(self.description, MovementDescription | None):
             raise ValueError(f"expected at least one state, found {self.n_states}")
@@ -289,7 +349,8 @@ class ParametricHMM(ABC):
         return self.options if self.options is not None else TrainingOptions()
 
     def _resampled(self, sequence: Floats) -> Floats:
-        return sequence if self.resampled_frames is None else resample(sequence, self.resampled_frames)
+        frames = self.resampled_frames_
+        return sequence if frames is None else resample(sequence, frames)
 
 
 _CLASSES: dict[str, type[ParametricHMM]] = {}  # classes that a file may name; filled as they are defined
@@ -300,6 +361,23 @@ def _load_all_classes() -> None:
     package = importlib.import_module(__package__ or "")  # no import statement: cached results depend on no other class
     for name in dir(package):
         getattr(package, name)
+
+
+def _whole(number: Any) -> bool:
+    return isinstance(number, Integral) and not isinstance(number, bool)
+
+
+def checked_theta(theta: ArrayLike, count: int) -> Floats:
+    """Labels of `count` sequences, (K, P) or (K,), as (K, P). Raises ValueError with the first that is not finite."""
+    labels = np.asarray(theta, dtype=np.float64)
+    labels = labels[:, None] if labels.ndim == 1 else labels
+    if labels.ndim != 2 or len(labels) != count or not labels.size:
+        raise ValueError(f"theta has one row per sequence: expected shape ({count}, P), found {labels.shape}")
+    wrong = np.flatnonzero(~np.isfinite(labels).all(axis=1))
+    if len(wrong):
+        first = int(wrong[0])
+        raise ValueError(f"theta is finite, found {labels[first].tolist()} for sequence {first}, {len(wrong)} in all")
+    return labels
 
 
 def check_training(

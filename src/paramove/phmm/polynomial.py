@@ -59,8 +59,8 @@ class PolynomialPHMM(ExaminingPHMM):
     def __init__(
         self,
         n_states: int = 20,
-        d_min: int = 4,
-        d_max: int = 6,
+        d_min: int | None = None,
+        d_max: int | None = None,
         *,
         degree: int = 2,
         options: TrainingOptions | None = None,
@@ -89,10 +89,10 @@ class PolynomialPHMM(ExaminingPHMM):
                 f"coefficients of degree {self.degree} in {data.theta.shape[1]} parameters: give more different theta, "
                 "a lower degree, or a smoothness (a prior)"
             )
-        begin = equal_segments(data.sequences, self.n_states, self.d_min, self.d_max, options)
+        begin = equal_segments(data.sequences, self.n_states, self.d_min_, self.d_max_, options)
         coefficients = np.zeros((*begin.means.shape, len(monomials)))
         coefficients[..., 0] = begin.means
-        initial = RegressedParameters(coefficients, begin.covariances, begin.durations, self.d_min)
+        initial = RegressedParameters(coefficients, begin.covariances, begin.durations, self.d_min_)
         features = monomials.at(data.theta)
         trained, self.training_ = train_regressed(
             initial, data.sequences, features, monomials.degrees, options, self.smoothness
@@ -127,7 +127,7 @@ class PolynomialPHMM(ExaminingPHMM):
 
     def at(self, theta: ArrayLike) -> LeftRightHMM:
         """The HMM for theta (P,)."""
-        parameters = Parameters(self.state_means(theta), self.covariances_, self.durations_, self.d_min)
+        parameters = Parameters(self.state_means(theta), self.covariances_, self.durations_, self.d_min_)
         return LeftRightHMM.from_parameters(parameters, self.options)
 
     def state_means(self, theta: ArrayLike) -> Floats:
@@ -151,6 +151,7 @@ class PolynomialPHMM(ExaminingPHMM):
         """
         if not finished or self.performances_ is not None:
             return super().estimate(sequence, finished=finished)
+        self._check_trained()
         model = self._expecting_noise_of(checked_sequence(sequence, self.covariances_.shape[-1]))
         if model is not self:
             return model.estimate(sequence)
@@ -187,7 +188,14 @@ class PolynomialPHMM(ExaminingPHMM):
         ends = evaluator.ends(len(sequence))
         frames, rows = search_kernels.whitened_frames(np.ascontiguousarray(sequence.T), evaluator.whitening, ends)
         return search_kernels.Movement(
-            frames, rows, white, self.monomials_.exponents, evaluator.log_norm, evaluator.log_duration, self.d_min, ends
+            frames,
+            rows,
+            white,
+            self.monomials_.exponents,
+            evaluator.log_norm,
+            evaluator.log_duration,
+            self.d_min_,
+            ends,
         )
 
     def _whitened(self) -> tuple[Evaluator, Floats]:
@@ -219,7 +227,7 @@ class PolynomialPHMM(ExaminingPHMM):
         expected: dict[str, tuple[int, ...]]
         expected = {"coefficients": (self.n_states, dim, len(monomials)), "covariances": (self.n_states, dim, dim)}
         expected |= {
-            "durations": (self.n_states, self.d_max),
+            "durations": (self.n_states, self.d_max_),
             "theta_centre": centre.shape,
             "theta_scale": centre.shape,
         }
@@ -227,9 +235,9 @@ class PolynomialPHMM(ExaminingPHMM):
             if arrays[name].shape != shape:
                 raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
         local = (arrays["coefficients"][None, ..., 0], arrays["covariances"][None], arrays["durations"][None])
-        check_local_models(*local, self.d_min)
+        check_local_models(*local, self.d_min_)
         learned = (arrays["coefficients"], arrays["covariances"], arrays["durations"])
-        self._set_learned(monomials, RegressedParameters(*learned, self.d_min))
+        self._set_learned(monomials, RegressedParameters(*learned, self.d_min_))
         self.performances_ = None
         if self.residuals == "correlated":
             self.performances_ = Performances.from_arrays(arrays, monomials)

@@ -92,7 +92,7 @@ def _plain(value: Any) -> Any:
         return value.as_record()
     if isinstance(value, TrainingOptions):
         return asdict(value)
-    return value
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _rich(name: str, value: Any) -> Any:

@@ -62,7 +62,7 @@ def on_set(model: ParametricHMM, demonstrations: DemonstrationSet) -> dict[str, 
         frames = recognition.movement.frames
         errors.append(recognition.estimate.theta - recognition.labelled)
         inside.append(covers(recognition.estimate.theta, recognition.estimate.covariance, recognition.labelled))
-        count = model.resampled_frames or len(frames)
+        count = model.resampled_frames_ or len(frames)
         likelihoods.append(model.log_likelihood(frames, recognition.labelled) / count)
         synthesis.append(synthesis_error(model, recognition.labelled, frames, dimension(model) // 3))
     rms = np.sqrt((np.array(errors) ** 2).mean(axis=0))

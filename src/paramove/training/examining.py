@@ -161,7 +161,7 @@ class Examiner:
 
 def _scored_by(model: ParametricHMM) -> tuple[object, ...]:
     """Models whose scores are comparable have the same of these."""
-    return ("p_value",) if has_p_values(model) else (model.n_states, model.resampled_frames)
+    return ("p_value",) if has_p_values(model) else (model.n_states, model.resampled_frames_)
 
 
 def percent(probability: float) -> str:

@@ -59,8 +59,8 @@ class Trained:
             "rate_hz": examples.rate_hz,
             "bounds": {name: list(pair) for name, pair in zip(examples.parameter_names, low_high, strict=True)},
             "states": model.n_states,
-            "frames_per_state": [model.d_min, model.d_max],
-            "resampled_frames": model.resampled_frames,
+            "frames_per_state": [model.d_min_, model.d_max_],
+            "resampled_frames": model.resampled_frames_,
             "seconds": self.seconds,
         }
         summary = model.training_

@@ -57,8 +57,8 @@ class NeuralPHMM(ExaminingPHMM):
     def __init__(
         self,
         n_states: int = 20,
-        d_min: int = 4,
-        d_max: int = 6,
+        d_min: int | None = None,
+        d_max: int | None = None,
         *,
         n_hidden: int | None = None,
         skip_degree: int = 2,
@@ -96,7 +96,7 @@ class NeuralPHMM(ExaminingPHMM):
         positions, features = (data.theta - monomials.centre) / monomials.scale, monomials.at(data.theta)
         begin = NetworkParameters(
             StateNetworks(np.zeros((0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0))),
-            aligned.covariances, aligned.durations, self.d_min,
+            aligned.covariances, aligned.durations, self.d_min_,
         )  # fmt: skip
         means = np.einsum("ndf,kf->knd", aligned.coefficients, polynomial.at(data.theta))
         moments = SequenceMoments.gathered(begin, data.sequences, means)
@@ -113,7 +113,7 @@ class NeuralPHMM(ExaminingPHMM):
         minimum = 1 if self.skip_degree == 0 else 0
         choice = chosen_units(targets, data.groups, (self.n_hidden, minimum), self.n_restarts, self.seed)
         targets = with_decay(targets, choice)
-        begin = NetworkParameters(targets.networks(choice.inner), aligned.covariances, aligned.durations, self.d_min)
+        begin = NetworkParameters(targets.networks(choice.inner), aligned.covariances, aligned.durations, self.d_min_)
         prior = NetworkPrior(metric, targets.ridge)
         trained, self.training_ = train_networks(
             begin, prior, data.sequences, positions, features, options, self.gradient_steps
@@ -125,10 +125,10 @@ class NeuralPHMM(ExaminingPHMM):
     def _aligned(self, data: TrainingData, options: TrainingOptions) -> tuple[RegressedParameters, Monomials]:
         """A polynomial model that aligns frames and states."""
         monomials = _monomials(max(1, self.skip_degree), data.theta)
-        begin = equal_segments(data.sequences, self.n_states, self.d_min, self.d_max, options)
+        begin = equal_segments(data.sequences, self.n_states, self.d_min_, self.d_max_, options)
         coefficients = np.zeros((*begin.means.shape, len(monomials)))
         coefficients[..., 0] = begin.means
-        initial = RegressedParameters(coefficients, begin.covariances, begin.durations, self.d_min)
+        initial = RegressedParameters(coefficients, begin.covariances, begin.durations, self.d_min_)
         features = monomials.at(data.theta)
         trained, _ = train_regressed(initial, data.sequences, features, monomials.degrees, options, SMOOTHNESS)
         return trained, monomials
@@ -146,7 +146,7 @@ class NeuralPHMM(ExaminingPHMM):
 
     def at(self, theta: ArrayLike) -> LeftRightHMM:
         """The HMM for theta (P,)."""
-        parameters = Parameters(self.state_means(theta), self.covariances_, self.durations_, self.d_min)
+        parameters = Parameters(self.state_means(theta), self.covariances_, self.durations_, self.d_min_)
         return LeftRightHMM.from_parameters(parameters, self.options)
 
     def state_means(self, theta: ArrayLike) -> Floats:
@@ -209,7 +209,7 @@ class NeuralPHMM(ExaminingPHMM):
         frames, rows = search_kernels.whitened_frames(np.ascontiguousarray(sequence.T), evaluator.whitening, ends)
         none = np.zeros((0, 0), np.int64)
         return search_kernels.Movement(
-            frames, rows, evaluator.whitening, none, evaluator.log_norm, evaluator.log_duration, self.d_min, ends
+            frames, rows, evaluator.whitening, none, evaluator.log_norm, evaluator.log_duration, self.d_min_, ends
         )
 
     def _common(self) -> Evaluator:
@@ -242,11 +242,14 @@ class NeuralPHMM(ExaminingPHMM):
         monomials = Monomials(spanned.exponents, centre, scale)
         networks = StateNetworks.from_arrays(arrays, self.n_states, len(monomials), len(centre))
         dim = networks.skip.shape[1]
-        for name, shape in {"covariances": (self.n_states, dim, dim), "durations": (self.n_states, self.d_max)}.items():
+        for name, shape in {
+            "covariances": (self.n_states, dim, dim),
+            "durations": (self.n_states, self.d_max_),
+        }.items():
             if arrays[name].shape != shape:
                 raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
         local = (networks.skip[None, ..., 0], arrays["covariances"][None], arrays["durations"][None])
-        check_local_models(*local, self.d_min)
+        check_local_models(*local, self.d_min_)
         self._set_learned(monomials, networks, arrays["covariances"], arrays["durations"])
         units = replace(monomials, units=networks.inner[-1])
         self.performances_ = Performances.from_arrays(arrays, units)
