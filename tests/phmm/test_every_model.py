@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from copy import deepcopy
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from sklearn.preprocessing import FunctionTransformer
 from sklearn.utils.validation import check_is_fitted
 
 from paramove.hmm import NotFittedError as OurNotFittedError
-from paramove.hmm import SequenceLengthError
+from paramove.hmm import SequenceLengthError, resample
 from paramove.phmm import (
     InterpolativePHMM,
     LinearPHMM,
@@ -222,10 +221,37 @@ def test_durations_of_states_follow_from_the_frames() -> None:
     assert LinearPHMM(300).d_min_ == 1
     assert LinearPHMM(8, 4, 6).resampled_frames_ is None
     assert LinearPHMM(8, resampled_frames=40).d_max_ == 6
-    with pytest.raises(ValueError, match="both d_min and d_max or none of them, found 4 and None"):
-        LinearPHMM(8, 4).fit(*shown(0))
+    assert (LinearPHMM(d_max=9).d_min_, LinearPHMM(d_max=9).resampled_frames_) == (4, None)
     with pytest.raises(ValueError, match="at least one state, found 0"):
         LinearPHMM(0).fit(*shown(0))
+
+
+@every_class
+def test_far_movements_take_their_natural_duration(kind: type[ParametricHMM], tmp_path: Path) -> None:
+    sequences, theta = shown(3, lines=3, repetitions=4)
+    sequences = [resample(x, round(60 * (1.0 + u))) for x, (u, _) in zip(sequences, theta, strict=True)]
+    model = kind(8).fit(sequences, theta)
+    model.save(tmp_path / "model.npz")
+    again = ParametricHMM.load(tmp_path / "model.npz")
+    assert_allclose(again.natural_frames([[0.0, 0.5], [1.0, 0.2], [9.0, 0.2]]), [61, 121, 121], atol=4)
+    assert model.synthesize([1.0, 0.0], model.natural_frames([1.0, 0.0])).shape == (again.natural_frames([1, 0]), 3)
+    with np.load(tmp_path / "model.npz", allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files} | {"learned_log_frames": np.zeros(2)}
+    np.savez(tmp_path / "broken.npz", **arrays)
+    with pytest.raises(ModelFileError, match="log_frames"):
+        ParametricHMM.load(tmp_path / "broken.npz")
+    with pytest.raises(NotFittedError):
+        kind().natural_frames([0.0, 0.0])
+
+
+def test_durations_that_do_not_depend_on_theta_stay_so() -> None:
+    rng = np.random.default_rng(5)
+    sequences, theta = shown(3, lines=3, repetitions=4)
+    sequences = [resample(x, int(rng.integers(80, 121))) for x in sequences]
+    found = LinearPHMM().fit(sequences, theta).natural_frames(theta)
+    assert np.ptp(found) < 12
+    equal = LinearPHMM().fit([resample(x, 90) for x in sequences], theta)
+    assert (equal.natural_frames(theta) == 90).all()
 
 
 def test_an_untrained_model_is_reported_as_scikit_learn_does() -> None:
@@ -233,7 +259,7 @@ def test_an_untrained_model_is_reported_as_scikit_learn_does() -> None:
     with pytest.raises(NotFittedError) as caught:
         model.predict([UNSEEN])
     assert isinstance(caught.value, OurNotFittedError)
-    assert isinstance(pickle.loads(pickle.dumps(caught.value)), NotFittedError)
+    assert isinstance(deepcopy(caught.value), NotFittedError)  # as joblib sends it
     for ask in (model.estimate, lambda x: model.score([x], [[0.0]]), lambda x: MovementClassifier().classify(x)):
         with pytest.raises(NotFittedError):
             ask(UNSEEN)

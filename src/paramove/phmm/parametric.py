@@ -32,8 +32,10 @@ from paramove.hmm import (
 )
 from paramove.hmm import Path as PathKind
 from paramove.phmm.description import MovementDescription
+from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, NoiseLevel
 from paramove.phmm.performance import groups_of
+from paramove.phmm.ridge import chosen_ridge, penalties
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 
 MAX_FRAMES = 100_000
@@ -80,6 +82,8 @@ class ParametricHMM(ABC):
         d_min_, d_max_, resampled_frames_: those in use.
         parameter_bounds_: minimum and maximum theta of the training, shape (2, P).
         training_theta_: the different theta of the training, shape (K, P); None in files of earlier releases.
+        log_frames_: coefficients of the logarithm of a movement's number of frames, linear in theta, (P + 1,); None in
+            models made of given HMMs.
         flat_theta_: whether theta of the training was (K,), which `predict` then returns.
         training_noise_: noise of the training; None in files of earlier releases, which then ignore noise.
         training_: summary of the training.
@@ -105,6 +109,7 @@ class ParametricHMM(ABC):
         self.training_theta_: Floats | None = None
         self.training_noise_: NoiseLevel | None = None
         self.flat_theta_ = False
+        self.log_frames_: Floats | None = None
         self.training_: TrainingSummary | None = None
 
     @property
@@ -125,8 +130,6 @@ class ParametricHMM(ABC):
 
     @property
     def _frames_per_state(self) -> float:
-        if (self.d_min is None) != (self.d_max is None):
-            raise ValueError(f"give both d_min and d_max or none of them, found {self.d_min} and {self.d_max}")
         return (self.resampled_frames_ or DEFAULT_FRAMES) / max(1, self.n_states)
 
     @abstractmethod
@@ -170,11 +173,17 @@ class ParametricHMM(ABC):
         labels = checked_theta(theta, len(checked))
         floor = self._training_options().floor_deviation
         check_training(recorded, checked, labels, (self.n_states, self.d_min_, self.d_max_), floor)
-        self._fit(TrainingData(checked, recorded, labels, groups_of(groups, labels)))
+        numbers = groups_of(groups, labels)
+        self._fit(TrainingData(checked, recorded, labels, numbers))
         self.parameter_bounds_ = np.stack([labels.min(axis=0), labels.max(axis=0)])
         self.training_theta_ = np.unique(labels, axis=0)
         self.training_noise_ = NoiseLevel.of(recorded)
         self.flat_theta_ = np.ndim(theta) == 1
+        linear, log_frames = Monomials.of_degree(1, labels), np.log([[len(sequence)] for sequence in recorded])
+        features = linear.at(labels)
+        penalty = penalties(chosen_ridge(log_frames, features, linear.degrees, numbers), linear.degrees, len(labels))
+        coefficients = np.linalg.solve(features.T @ features + penalty, features.T @ log_frames)
+        self.log_frames_ = coefficients[:, 0].astype(np.float64)
         return self
 
     def log_likelihood(self, sequence: ArrayLike, theta: ArrayLike) -> float:
@@ -215,6 +224,19 @@ class ParametricHMM(ABC):
                 raise ValueError("give n_samples or duration, not both")
             n_samples = max(2, round(duration * sample_rate) + 1)
         return self.at(theta).synthesize(n_samples, timing, path)
+
+    def natural_frames(self, theta: ArrayLike) -> Any:
+        """How many frames a movement of theta takes, at the frame rate of the training.
+
+        A whole number for one theta (P,), an array (M,) for many (M, P). Of the nearest theta within the bounds of the
+        training. Raises NotFittedError before training and for a model that was made of given HMMs.
+        """
+        if self.parameter_bounds_ is None or self.log_frames_ is None:
+            raise not_fitted("this model has seen no movements, so it knows no durations: call fit")
+        inside = np.clip(np.asarray(theta, dtype=np.float64), *self.parameter_bounds_)
+        logarithms = Monomials.of_degree(1, self.parameter_bounds_).at(inside) @ self.log_frames_
+        frames = np.maximum(2, np.round(np.exp(logarithms))).astype(np.int64)
+        return frames if frames.ndim else int(frames)
 
     def progress_mean(self, theta: ArrayLike, tau: float | Floats) -> Floats:
         """Mean pose at progress tau in [0, 1] (6.2). Shape (D,); for many theta (M, P) and tau (M,): (M, D)."""
@@ -271,6 +293,8 @@ class ParametricHMM(ABC):
         arrays = {"parameter_bounds": np.asarray(self.parameter_bounds_), **self._arrays()}
         if self.flat_theta_:
             arrays["flat_theta"] = np.ones(1)
+        if self.log_frames_ is not None:
+            arrays["log_frames"] = self.log_frames_
         if self.training_theta_ is not None:
             arrays["training_theta"] = self.training_theta_
         if self.training_noise_ is not None:
@@ -297,6 +321,9 @@ class ParametricHMM(ABC):
             model.parameter_bounds_ = arrays.pop("parameter_bounds")
             model.training_theta_ = arrays.pop("training_theta", None)
             model.flat_theta_ = arrays.pop("flat_theta", None) is not None
+            model.log_frames_ = arrays.pop("log_frames", None)
+            if model.log_frames_ is not None and model.log_frames_.shape != (model.parameter_bounds_.shape[-1] + 1,):
+                raise ValueError(f"expected one more log_frames than parameters, found {model.log_frames_.shape}")
             noise = arrays.pop("training_noise", None)
             model.training_noise_ = None if noise is None else NoiseLevel.from_array(noise)
             model._set_arrays(arrays)

@@ -47,6 +47,7 @@ def test_few_and_tidy_movements_differ_between_seeds_and_repeat() -> None:
     assert {name: len(folds) for name, folds in tasks.items()} == {
         "scripted/same": 2,
         "scripted/3 mm": 2,
+        "raster/1 repetition": 2,
         "raster/2 repetitions": 2,
         "raster/5 repetitions": 2,
         "raster/20 repetitions": 2,
