@@ -221,7 +221,7 @@ def test_durations_of_states_follow_from_the_frames() -> None:
     assert LinearPHMM(300).d_min_ == 1
     assert LinearPHMM(8, 4, 6).resampled_frames_ is None
     assert LinearPHMM(8, resampled_frames=40).d_max_ == 6
-    assert (LinearPHMM(d_max=9).d_min_, LinearPHMM(d_max=9).resampled_frames_) == (4, None)
+    assert (LinearPHMM(d_max=9).d_min_, LinearPHMM(d_max=9).resampled_frames_, LinearPHMM(8, 4).d_max_) == (1, None, 8)
     with pytest.raises(ValueError, match="at least one state, found 0"):
         LinearPHMM(0).fit(*shown(0))
 

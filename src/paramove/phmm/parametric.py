@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
+from math import ceil
 from numbers import Integral
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -72,7 +73,7 @@ class ParametricHMM(ABC):
 
     Args:
         n_states, d_min, d_max: as in `LeftRightHMM`. Without d_min and d_max states last as long as the frames allow,
-            up to a fifth shorter or longer.
+            up to a fifth shorter or longer; with one of them alone, from one frame, or up to twice d_min.
         options: training options.
         resampled_frames: every sequence is first resampled to this many frames (thesis 4.1.2.1). Without it, to 100, or
             with d_min and d_max to none: they then count recorded frames.
@@ -121,16 +122,20 @@ class ParametricHMM(ABC):
     @property
     def d_min_(self) -> int:
         """Minimum frames of a state."""
-        return self.d_min if self.d_min is not None else max(1, int((1.0 - STATE_MARGIN) * self._frames_per_state))
+        if self.d_min is None:
+            return 1 if self.d_max is not None else max(1, int((1.0 - STATE_MARGIN) * self._frames_per_state))
+        return self.d_min
 
     @property
     def d_max_(self) -> int:
         """Maximum frames of a state."""
-        return self.d_max if self.d_max is not None else int(np.ceil((1.0 + STATE_MARGIN) * self._frames_per_state))
+        if self.d_max is None:
+            return 2 * self.d_min if self.d_min is not None else ceil((1.0 + STATE_MARGIN) * self._frames_per_state)
+        return self.d_max
 
     @property
     def _frames_per_state(self) -> float:
-        return (self.resampled_frames_ or DEFAULT_FRAMES) / max(1, self.n_states)
+        return (self.resampled_frames or DEFAULT_FRAMES) / max(1, self.n_states)
 
     @abstractmethod
     def at(self, theta: ArrayLike) -> LeftRightHMM:
