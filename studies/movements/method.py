@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from paramove.documents import Floats, Ints
 
-SYNTHESIS, THETA, CLASSES, BEGINNINGS, OUTLIERS = "synthesis", "theta", "classes", "beginnings", "outliers"
-THETA_OF_BEGINNINGS = "theta of beginnings"
+SYNTHESIS, THETA, THETA_OF_BEGINNINGS = "synthesis", "theta", "theta of beginnings"
+CLASSES, BEGINNINGS, OUTLIERS = "classes", "beginnings", "outliers"
 """What a method declares that it can do; the tables show a dash for anything else."""
 FRAMES = 100
 """Frames that movements are resampled to wherever a method needs equal lengths."""

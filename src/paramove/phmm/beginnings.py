@@ -90,10 +90,7 @@ class Beginnings:
 
         Raises ValueError for a beginning of fewer than 5 frames.
         """
-        if len(sequence) < FIRST_FRAMES:
-            raise ValueError(
-                f"a beginning has at least {FIRST_FRAMES} frames, found {len(sequence)}: wait for more of the movement"
-            )
+        check_beginning(len(sequence), FIRST_FRAMES)
         durations = np.log(len(sequence)) - np.log(FRACTIONS)
         shortest, longest = self.log_durations
         possible = np.flatnonzero((durations > shortest) & (durations < longest))
@@ -150,6 +147,12 @@ class Beginnings:
                 f"expected 3 numbers in beginnings and regressions of one length, found {scalars.shape} and {lengths}"
             )
         return cls(regressions, bool(scalars[0]), (float(scalars[1]), float(scalars[2])))
+
+
+def check_beginning(n_frames: int, minimum: int) -> None:
+    """Raises ValueError for a beginning of fewer frames than that."""
+    if n_frames < minimum:
+        raise ValueError(f"a beginning has at least {minimum} frames, found {n_frames}: wait for more of the movement")
 
 
 def points_of(sequence: ArrayLike, increments: bool) -> Floats:

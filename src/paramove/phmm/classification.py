@@ -20,7 +20,7 @@ from scipy.special import logsumexp
 
 from paramove.documents import Floats, Ints, renamed_attribute
 from paramove.hmm import checked_sequence, checked_sequences, not_fitted, resample
-from paramove.phmm.beginnings import FIRST_FRAMES
+from paramove.phmm.beginnings import FIRST_FRAMES, check_beginning
 from paramove.phmm.examining import has_p_values
 from paramove.phmm.left_out import fold_numbers
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
@@ -203,15 +203,10 @@ class MovementClassifier:
         return self.models_
 
     def _discriminant(self, n_frames: int) -> BeginningDiscriminant:
-        usable = [one for one in self._beginnings if one.n_frames <= n_frames]
         if not self._beginnings:
             raise ValueError("only a classifier trained with `fit` on all actions together classifies beginnings")
-        if not usable:
-            minimum = self._beginnings[0].n_frames
-            raise ValueError(
-                f"a beginning has at least {minimum} frames, found {n_frames}: wait for more of the movement"
-            )
-        return usable[-1]
+        check_beginning(n_frames, self._beginnings[0].n_frames)
+        return [one for one in self._beginnings if one.n_frames <= n_frames][-1]
 
 
 def _result(model: ParametricHMM, sequence: Floats, finished: bool) -> tuple[ParameterEstimate, float, float]:

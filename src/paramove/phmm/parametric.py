@@ -36,7 +36,7 @@ from paramove.phmm.description import MovementDescription
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, NoiseLevel
 from paramove.phmm.performance import groups_of
-from paramove.phmm.ridge import chosen_ridge, penalties
+from paramove.phmm.ridge import smoothed
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 
 MAX_FRAMES = 100_000
@@ -185,10 +185,7 @@ class ParametricHMM(ABC):
         self.training_noise_ = NoiseLevel.of(recorded)
         self.flat_theta_ = np.ndim(theta) == 1
         linear, log_frames = Monomials.of_degree(1, labels), np.log([[len(sequence)] for sequence in recorded])
-        features = linear.at(labels)
-        penalty = penalties(chosen_ridge(log_frames, features, linear.degrees, numbers), linear.degrees, len(labels))
-        coefficients = np.linalg.solve(features.T @ features + penalty, features.T @ log_frames)
-        self.log_frames_ = coefficients[:, 0].astype(np.float64)
+        self.log_frames_ = smoothed(linear.at(labels), linear.degrees, log_frames, numbers)[0]
         return self
 
     def log_likelihood(self, sequence: ArrayLike, theta: ArrayLike) -> float:
