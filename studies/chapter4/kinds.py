@@ -42,12 +42,13 @@ QPHMM_3, CPHMM_3, NPHMM_3 = "QPHMM 3×3", "CPHMM 3×3", "NPHMM 3×3"
 OURS = ", correlated"
 
 KINDS = (
-    Kind(IPHMM_2, InterpolativePHMM, corners=True, thesis=IPHMM_2),
-    Kind(IPHMM_3, InterpolativePHMM, thesis=IPHMM_3),
+    Kind(IPHMM_2, InterpolativePHMM, corners=True, residuals="independent", thesis=IPHMM_2),
+    Kind(IPHMM_3, InterpolativePHMM, residuals="independent", thesis=IPHMM_3),
     Kind(LPHMM_2, LinearPHMM, corners=True, residuals="independent", thesis=LPHMM_2),
     Kind(LPHMM_3, LinearPHMM, residuals="independent", thesis=LPHMM_3),
     Kind(QPHMM_3, QuadraticPHMM, residuals="independent", thesis="QPHMM"),
     Kind(CPHMM_3, CubicPHMM, residuals="independent"),
+    Kind(IPHMM_3 + OURS, InterpolativePHMM, residuals="correlated"),
     Kind(LPHMM_2 + OURS, LinearPHMM, corners=True, residuals="correlated"),
     Kind(LPHMM_3 + OURS, LinearPHMM, residuals="correlated"),
     Kind(QPHMM_3 + OURS, QuadraticPHMM, residuals="correlated"),

@@ -12,10 +12,11 @@ from paramove.documents import Floats
 from paramove.hmm import TrainingOptions
 from paramove.phmm import (
     CubicPHMM,
+    InterpolativePHMM,
     LinearPHMM,
     MovementClassifier,
+    NeuralPHMM,
     ParametricHMM,
-    PolynomialPHMM,
     QuadraticPHMM,
     has_p_values,
 )
@@ -45,8 +46,7 @@ class Models(NotAble):
 
     def __init__(self, make: Callable[[], ParametricHMM]) -> None:
         self.make = make
-        model = make()
-        if isinstance(model, PolynomialPHMM) and model.residuals == "correlated":
+        if getattr(make(), "residuals", None) == "correlated":
             self.can = Models.can | {BEGINNINGS, THETA_OF_BEGINNINGS}
 
     def fit(self, examples: Examples) -> None:
@@ -90,6 +90,8 @@ def our_rows() -> list[Row]:
         "paramove, quadratic PHMM": partial(QuadraticPHMM, **common),
         "paramove, linear PHMM": partial(LinearPHMM, **common),
         "paramove, cubic PHMM": partial(CubicPHMM, **common),
+        "paramove, neural PHMM": partial(NeuralPHMM, **common),
+        "paramove, interpolative PHMM": partial(InterpolativePHMM, **common),
         "paramove, quadratic PHMM as in the thesis": partial(QuadraticPHMM, residuals="independent", **common),
     }
     return [Row(name, _maker(make), repr(make), ours=True) for name, make in kinds.items()]

@@ -26,6 +26,7 @@ from paramove.phmm import (
     MovementClassifier,
     ParametricHMM,
     QuadraticPHMM,
+    has_p_values,
 )
 from tests.phmm.movements import CLASSES, shown, trained, untrained, wave
 
@@ -109,15 +110,16 @@ def test_what_cannot_be_estimated_is_refused(
         model.at([0.1, np.nan])
 
 
-@pytest.mark.parametrize("kind", [one for one in CLASSES if not issubclass(one, LinearPHMM | QuadraticPHMM)])
-def test_models_of_complete_movements_say_who_knows_beginnings(
+@every_class
+def test_beginnings_and_p_values_are_everybodys(
     models: dict[type[ParametricHMM], ParametricHMM], kind: type[ParametricHMM]
 ) -> None:
-    if kind.__name__ != "InterpolativePHMM":
-        assert np.isfinite(models[kind].estimate(UNSEEN[:20], finished=False).theta).all()
-        return
-    with pytest.raises(ValueError, match="a QuadraticPHMM also of beginnings"):
-        models[kind].estimate(UNSEEN[:20], finished=False)
+    model = models[kind]
+    assert has_p_values(model)
+    assert_allclose(model.estimate(UNSEEN[:30], finished=False).theta, [0.3, 0.7], rtol=0.0, atol=0.2)
+    stopped = np.concatenate([UNSEEN[:20], np.repeat(UNSEEN[20:21], 20, axis=0)])
+    assert model.examine(UNSEEN).p_value > 0.05
+    assert model.examine(stopped).p_value < 0.001
 
 
 @every_class

@@ -32,6 +32,8 @@ SHRINKAGES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
 NEWTON_STEPS = 12
 MARGIN = 1.0
 """How far outside the bounds of the training left-out movements may lie, as a fraction of the width of theta."""
+UNSEEN_CURVATURE = 0.045
+"""Deviation of scaled theta by each coefficient above degree 1 that no theta of the training determines."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,7 @@ class CorrelatedRegression:
         monomials: of theta.
         coefficients: Z, shape (n, F).
         uncertainty: V, covariance of the coefficients in units of C, shape (F, F).
+        unseen: W, the same of what the shown theta cannot determine, see `unseen_curvature`, shape (F, F).
         root: lower triangular L with C = L L', shape (n, n).
         inflation: factor on covariances of theta that gives regions their nominal coverage.
         distances: squared Mahalanobis distances of training movements, each left out, in their order. Shape (K,).
@@ -52,6 +55,7 @@ class CorrelatedRegression:
     monomials: Monomials
     coefficients: Floats
     uncertainty: Floats
+    unseen: Floats
     root: Floats
     inflation: float
     distances: Floats
@@ -182,7 +186,8 @@ class CorrelatedRegression:
         """Everything learned, for a file."""
         scalars = np.array([self.inflation, self.shrinkage, *self.ridge])
         return {
-            "coefficients": self.coefficients, "uncertainty": self.uncertainty, "root": self.root,
+            "coefficients": self.coefficients, "uncertainty": self.uncertainty, "unseen": self.unseen,
+            "root": self.root,
             "distances": self.distances, "groups": self.groups.astype(np.float64), "scalars": scalars,
         }  # fmt: skip
 
@@ -191,12 +196,12 @@ class CorrelatedRegression:
         """From the result of `arrays`, with a prefix to the names. Raises ValueError for shapes that do not fit."""
         own = {
             name: arrays[f"{prefix}{name}"]
-            for name in ("coefficients", "uncertainty", "root", "distances", "groups", "scalars")
+            for name in ("coefficients", "uncertainty", "unseen", "root", "distances", "groups", "scalars")
         }
         count, size, scalars = len(own["coefficients"]), len(monomials), own["scalars"]
         expected: dict[str, tuple[int, ...]]
-        expected = {"coefficients": (count, size), "uncertainty": (size, size), "root": (count, count)}
-        expected |= {"distances": own["groups"].shape, "groups": (len(own["distances"]),)}
+        expected = {"coefficients": (count, size), "uncertainty": (size, size), "unseen": (size, size)}
+        expected |= {"root": (count, count), "distances": own["groups"].shape, "groups": (len(own["distances"]),)}
         for name, shape in expected.items():
             if own[name].shape != shape:
                 raise ValueError(f"expected {prefix}{name} of shape {shape}, found {own[name].shape}")
@@ -204,8 +209,8 @@ class CorrelatedRegression:
             raise ValueError(f"expected a root with a positive diagonal and an inflation above 0 in {prefix}scalars")
         inflation, shrinkage, *ridge = (float(one) for one in scalars)
         return cls(
-            monomials, own["coefficients"], own["uncertainty"], own["root"], inflation, own["distances"],
-            own["groups"].astype(np.int64), tuple(ridge), shrinkage,
+            monomials, own["coefficients"], own["uncertainty"], own["unseen"], own["root"], inflation,
+            own["distances"], own["groups"].astype(np.int64), tuple(ridge), shrinkage,
         )  # fmt: skip
 
     def _check_length(self, y: Floats) -> None:
@@ -228,7 +233,7 @@ class CondensedRegressions:
     Attributes:
         monomials: of all of them.
         inverses: L^-1, (R, n, n). white: L^-1 Z, (R, n, F). projectors: Q' L^-1, (R, F, n). triangles: R, (R, F, F).
-        uncertainty: V, (R, F, F). inflation: (R,). log_norms: logarithm of the density at distance 0, (R,).
+        uncertainty: V, (R, F, F). unseen: W, (R, F, F). inflation: (R,). log_norms: of the density at distance 0, (R,).
     """
 
     monomials: Monomials
@@ -237,6 +242,7 @@ class CondensedRegressions:
     projectors: Floats
     triangles: Floats
     uncertainty: Floats
+    unseen: Floats
     inflation: Floats
     log_norms: Floats
 
@@ -250,6 +256,7 @@ class CondensedRegressions:
         return cls(
             regressions[0].monomials, inverses, white, np.swapaxes(bases, 1, 2) @ inverses,
             np.ascontiguousarray(triangles), np.stack([one.uncertainty for one in regressions]),
+            np.stack([one.unseen for one in regressions]),
             np.array([one.inflation for one in regressions]), np.array([one.log_density(0.0) for one in regressions]),
         )  # fmt: skip
 
@@ -266,10 +273,11 @@ class CondensedRegressions:
             own.starts, bound, own.exponents, own.logistic, condensed, self.triangles, NEWTON_STEPS
         )
         theta: Floats = own.centre + own.scale * positions
-        information = np.swapaxes(slopes, 1, 2) @ slopes / variances_at(own.at(theta), self.uncertainty)[:, None, None]
-        information += np.eye(len(own.scale)) / bound**2
-        units = self.inflation[:, None, None] * (own.scale[:, None] * own.scale)
-        return theta, np.linalg.inv(information) * units
+        phi, widest = own.at(theta), np.eye(len(own.scale))
+        information = np.swapaxes(slopes, 1, 2) @ slopes / variances_at(phi, self.uncertainty)[:, None, None]
+        covariances = self.inflation[:, None, None] * np.linalg.inv(information + widest / bound**2)
+        covariances += (variances_at(phi, self.unseen) - 1.0)[:, None, None] * widest
+        return theta, covariances * (own.scale[:, None] * own.scale)
 
     def distances_from(self, y: Floats, theta: Floats) -> Floats:
         """Of movements (K, n) from those of theta (K, P), see `CorrelatedRegression.distance`. Shape (K,)."""
@@ -287,6 +295,7 @@ class _Fit:
     monomials: Monomials
     coefficients: Floats
     uncertainty: Floats
+    unseen: Floats
     residuals: Floats
 
     @classmethod
@@ -298,7 +307,8 @@ class _Fit:
         uncertainty = np.linalg.inv(features.T @ features + penalty).astype(np.float64)
         coefficients = np.ascontiguousarray((uncertainty @ (features.T @ y)).T)  # as after reading a file
         rescaled = studentised_residuals if one_each else residuals_left_out
-        return cls(monomials, coefficients, uncertainty, rescaled(y, features, penalty, groups))
+        unseen = unseen_curvature(features, monomials.degrees)
+        return cls(monomials, coefficients, uncertainty, unseen, rescaled(y, features, penalty, groups))
 
     def root(self, shrinkage: float) -> Floats:
         return np.linalg.cholesky(shrunk(self.residuals, shrinkage)).astype(np.float64)
@@ -306,8 +316,8 @@ class _Fit:
     def regression(self, groups: Ints, ridge: tuple[float, ...], shrinkage: float) -> CorrelatedRegression:
         """Not calibrated yet."""
         return CorrelatedRegression(
-            self.monomials, self.coefficients, self.uncertainty, self.root(shrinkage), 1.0, np.zeros(len(groups)),
-            groups, ridge, shrinkage,
+            self.monomials, self.coefficients, self.uncertainty, self.unseen, self.root(shrinkage), 1.0,
+            np.zeros(len(groups)), groups, ridge, shrinkage,
         )  # fmt: skip
 
 
@@ -347,6 +357,17 @@ def variances_at(phi: Floats, uncertainty: Floats) -> Floats:
     """Factor on C for unseen movements with features phi (K, F): 1 + phi' V phi; V of all or of each. Shape (K,)."""
     result: Floats = 1.0 + ((phi[:, None] @ uncertainty)[:, 0] * phi).sum(axis=1)
     return result
+
+
+def unseen_curvature(features: Floats, degrees: Ints) -> Floats:
+    """Covariance of scaled theta by coefficients of degrees above 1 that features (K, F) do not determine. (F, F).
+
+    Between the four corners of a square, nothing shows whether a movement curves; neither residuals nor left-out
+    corners do. Such coefficients have a prior deviation.
+    """
+    precision = np.diag(np.where(degrees > 1, UNSEEN_CURVATURE**-2.0, 1.0))
+    known = features.T @ features / (1e-6 * UNSEEN_CURVATURE**2 * len(features))
+    return np.linalg.inv(known + precision).astype(np.float64)
 
 
 def shrunk(residuals: Floats, shrinkage: float) -> Floats:

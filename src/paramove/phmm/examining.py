@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import NamedTuple, TypeGuard
+from typing import Literal, NamedTuple, TypeGuard, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,8 +12,10 @@ from paramove.documents import Floats, renamed_attribute
 from paramove.hmm import check_length, checked_sequence
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise
-from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
+from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
 from paramove.phmm.performance import Performances, movement_parts
+
+Residuals = Literal["independent", "correlated"]
 
 
 class Examination(NamedTuple):
@@ -60,6 +62,7 @@ class ExaminingPHMM(ParametricHMM):
     monomials_: Monomials
     covariances_: Floats
     performances_: Performances | None = None
+    residuals: Residuals = "correlated"
     search_margin: float
 
     @abstractmethod
@@ -111,6 +114,21 @@ class ExaminingPHMM(ParametricHMM):
         theta, covariance = performances.estimate(parts, self.search_margin)
         return ParameterEstimate(theta, covariance, self._log_likelihood_at(checked, theta)), parts
 
+    def _fitted_performances(self, data: TrainingData, features: Monomials | None = None) -> Performances | None:
+        """Distribution of whole executions with these features of theta; None with independent residuals."""
+        if self.residuals not in get_args(Residuals):
+            raise ValueError(f"residuals are {' or '.join(get_args(Residuals))}, found {self.residuals!r}")
+        if self.residuals == "independent":
+            return None
+        return Performances.fitted(data.recorded, data.theta, features or self.monomials_, data.groups)
+
+    def _performance_arrays(self) -> dict[str, Floats]:
+        return {} if self.performances_ is None else self.performances_.arrays()
+
+    def _set_performances(self, arrays: dict[str, Floats], features: Monomials | None = None) -> None:
+        correlated = self.residuals == "correlated"
+        self.performances_ = Performances.from_arrays(arrays, features or self.monomials_) if correlated else None
+
     def _expect(self, noise: AddedNoise) -> None:
         self.covariances_ = self.covariances_ + noise.of_states
         if self.performances_ is not None:
@@ -129,3 +147,10 @@ class ExaminingPHMM(ParametricHMM):
         if values.shape[-1:] != (n_components,) or values.ndim > 2 or not np.isfinite(values).all():
             raise ValueError(f"theta has {n_components} finite components, found shape {values.shape}: {values}")
         return values
+
+
+def inverse_information(information: Floats, widest: float) -> Floats:
+    """Covariance, no standard deviation above `widest`. Shape (P, P)."""
+    values, vectors = np.linalg.eigh(information)
+    values = np.maximum(values, 1.0 / widest**2)
+    return np.asarray((vectors / values) @ vectors.T)

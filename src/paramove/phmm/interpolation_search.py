@@ -165,6 +165,12 @@ def region_at(position: Floats, knots: Floats, counts: Ints) -> int:
 
 
 @compiled
+def cell_at(position: Floats, knots: Floats, counts: Ints) -> Ints:
+    """The cell of a position; outside, that at the border. Shape (P,)."""
+    return cell_of(region_of(region_at(position, knots, counts), counts), counts)
+
+
+@compiled
 def likeliest(
     margin: float, smoothing: float, columns: Floats, knots: Floats, counts: Ints, means: Floats, covariances: Floats,
     durations: Floats, d_min: int,
@@ -186,7 +192,7 @@ def likeliest(
             rest //= counts[p] - 1
             middle[p] = 0.5 * (knots[p, line] + knots[p, line + 1])
         if n_cells > 1:
-            cell = cell_of(region_of(region_at(middle, knots, counts), counts), counts)
+            cell = cell_at(middle, knots, counts)
             candidate_value = value_at(
                 middle, cell, smoothing, columns, knots, counts, means, covariances, durations, d_min
             )

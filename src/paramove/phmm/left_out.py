@@ -36,14 +36,7 @@ def one_theta_each(theta: Floats, groups: Ints) -> bool:
     return bool(max(float((one / widths).max()) for one in within) < 0.1)
 
 
-def inflation_of(
-    tests: Sequence[Floats],
-    dimension: int,
-    n_persons: int | None,
-    *,
-    quantile_weight: float = 0.5,
-    minimum: float = 0.0,
-) -> float:
+def inflation_of(tests: Sequence[Floats], dimension: int, n_persons: int | None) -> float:
     """Factor on covariances of theta that gives regions their nominal coverage.
 
     It lies between what the mean and the 95 % quantile of the errors need, where that is more.
@@ -53,8 +46,6 @@ def inflation_of(
             the largest factor counts. None or empty if nothing could be left out.
         dimension: P.
         n_persons: how many persons the errors are from: few determine tails badly. None: errors are independent.
-        quantile_weight: 0 for what the mean needs, 1 for the quantile.
-        minimum: of the factor before few persons enlarge it.
     """
     few = 1.0 if n_persons is None else (n_persons + dimension) / max(1, n_persons - 1)
     factors = []
@@ -63,5 +54,5 @@ def inflation_of(
             level = min(1.0, 0.95 * (1.0 + 1.0 / len(excess)))
             mean = float(excess.mean()) / dimension
             tail = float(np.quantile(excess, level)) / float(chdtri(dimension, 0.05))
-            factors.append(mean + quantile_weight * max(0.0, tail - mean))
-    return few * max(minimum, *factors) if factors else few
+            factors.append(mean + 0.5 * max(0.0, tail - mean))
+    return few * max(factors) if factors else few

@@ -148,16 +148,6 @@ def distances_with_noise(distances: Floats, covariance: Floats, moments: Floats,
     return result
 
 
-def expected_responsibilities(durations: Floats, n_frames: int) -> Floats:
-    """Fraction of each frame in each state if states last as long as expected of (N, d_max) durations. Shape (N, T)."""
-    lengths = durations @ np.arange(1.0, durations.shape[1] + 1.0)
-    borders = np.concatenate([[0.0], np.cumsum(lengths)]) * n_frames / lengths.sum()
-    frames = np.arange(float(n_frames))
-    overlap = np.minimum(frames + 1.0, borders[1:, None]) - np.maximum(frames, borders[:-1, None])
-    result: Floats = np.maximum(overlap, 0.0)
-    return result
-
-
 def moving_average(sequence: Floats, width: int) -> tuple[Floats, Floats]:
     """Mean of `width` frames around each frame, fewer at the ends, (T, D), and of how many, (T,)."""
     sums = np.concatenate([np.zeros((1, sequence.shape[1])), np.cumsum(sequence, axis=0)])

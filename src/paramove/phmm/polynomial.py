@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import replace
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,16 +20,15 @@ from paramove.hmm import (
 )
 from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
-from paramove.phmm.examining import ExaminingPHMM
+from paramove.phmm.examining import ExaminingPHMM, Residuals, inverse_information
 from paramove.phmm.features import Monomials
 from paramove.phmm.local_models import check_local_models
 from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import ParameterEstimate, TrainingData
-from paramove.phmm.performance import Performances, state_averages
+from paramove.phmm.performance import state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
 from paramove.phmm.ridge import smoothed
 
-Residuals = Literal["independent", "correlated"]
 MAX_STEPS = 40
 STEP_TOLERANCE = 1e-5
 """Predicted gain in nats below which the search ends."""
@@ -81,8 +80,6 @@ class PolynomialPHMM(ExaminingPHMM):
     def _fit(self, data: TrainingData) -> None:
         options = self._training_options()
         monomials = Monomials.of_degree(self.degree, data.theta)
-        if self.residuals not in get_args(Residuals):
-            raise ValueError(f"residuals are {' or '.join(get_args(Residuals))}, found {self.residuals!r}")
         if self.smoothness is None and monomials.n_distinct(data.theta) < len(monomials):
             raise ValueError(
                 f"{len(np.unique(data.theta, axis=0))} different theta do not determine the {len(monomials)} "
@@ -97,14 +94,12 @@ class PolynomialPHMM(ExaminingPHMM):
         trained, self.training_ = train_regressed(
             initial, data.sequences, features, monomials.degrees, options, self.smoothness
         )
-        performances = None
-        if self.residuals == "correlated":
-            performances = Performances.fitted(data.recorded, data.theta, monomials, data.groups)
-            if self.smoothness is not None:
-                averages = self._state_averages(data, trained, monomials)
-                smooth = smoothed(features, monomials.degrees, averages, data.groups)
-                coefficients = smooth.reshape(coefficients.shape)
-                trained = with_coefficients(trained, coefficients, data.sequences, features, options)
+        performances = self._fitted_performances(data, monomials)
+        if performances is not None and self.smoothness is not None:
+            averages = self._state_averages(data, trained, monomials)
+            smooth = smoothed(features, monomials.degrees, averages, data.groups)
+            coefficients = smooth.reshape(coefficients.shape)
+            trained = with_coefficients(trained, coefficients, data.sequences, features, options)
         self._set_learned(monomials, trained)
         self.performances_ = performances
 
@@ -159,7 +154,7 @@ class PolynomialPHMM(ExaminingPHMM):
         best, value, gradient = self._likeliest(prepared)
         information = search_kernels.information_at(best, gradient, prepared)
         scale = self.monomials_.scale
-        covariance = _inverse_information(information, self._widest) * np.outer(scale, scale)
+        covariance = inverse_information(information, self._widest) * np.outer(scale, scale)
         return ParameterEstimate(self.monomials_.centre + scale * best, covariance, value)
 
     def _log_likelihood_at(self, checked: Floats, theta: Floats) -> float:
@@ -217,7 +212,7 @@ class PolynomialPHMM(ExaminingPHMM):
             "theta_centre": self.monomials_.centre,
             "theta_scale": self.monomials_.scale,
         }
-        return arrays if self.performances_ is None else arrays | self.performances_.arrays()
+        return arrays | self._performance_arrays()
 
     def _set_arrays(self, arrays: dict[str, Floats]) -> None:
         centre, scale = arrays["theta_centre"], arrays["theta_scale"]
@@ -238,9 +233,7 @@ class PolynomialPHMM(ExaminingPHMM):
         check_local_models(*local, self.d_min_)
         learned = (arrays["coefficients"], arrays["covariances"], arrays["durations"])
         self._set_learned(monomials, RegressedParameters(*learned, self.d_min_))
-        self.performances_ = None
-        if self.residuals == "correlated":
-            self.performances_ = Performances.from_arrays(arrays, monomials)
+        self._set_performances(arrays)
 
 
 class LinearPHMM(PolynomialPHMM):
@@ -259,10 +252,3 @@ class CubicPHMM(PolynomialPHMM):
 
     def __init__(self, *counts: int, degree: int = 3, **others: Any) -> None:
         super().__init__(*counts, degree=degree, **others)
-
-
-def _inverse_information(information: Floats, widest: float) -> Floats:
-    """Covariance, no standard deviation above `widest`. Shape (P, P)."""
-    values, vectors = np.linalg.eigh(information)
-    values = np.maximum(values, 1.0 / widest**2)
-    return np.asarray((vectors / values) @ vectors.T)

@@ -17,7 +17,7 @@ FORMAT_VERSION = 2
 MAX_BYTES = 256 * 2**20
 """Of all arrays together; the reaching model of 8 local models has 8 MB."""
 MAX_ARRAYS = 500
-"""Each of the twenty fractions of unfinished movements has six."""
+"""Each of the twenty fractions of unfinished movements has seven."""
 MAX_LETTERS = 100_000
 """Maximum of the header; that of a model with a description has 1 000."""
 

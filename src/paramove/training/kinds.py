@@ -55,7 +55,7 @@ def untrained(
         d_min, d_max: frames in a state; None: one less and one more than the mean, `frames / n_states`.
         frames: every movement is resampled to this many.
         floor_deviation: best accuracy of the points, m; 0: estimated from their variation.
-        residuals: "correlated" or "independent" of polynomial models; None: their default.
+        residuals: "correlated" or "independent"; None: the default of the model.
 
     Raises ValueError for a kind that is unknown or has no such residuals, and for states that do not fit the frames.
     """
@@ -74,7 +74,7 @@ def untrained(
     kind_class: Any = getattr(phmm, CLASSES[kind])
     arguments: dict[str, Any] = {} if residuals is None else {"residuals": residuals}
     if arguments and "residuals" not in kind_class._parameter_names():
-        raise ValueError(f"a model '{kind}' has no choice of residuals; only linear, quadratic and cubic ones have")
+        raise ValueError(f"a model '{kind}' has no choice of residuals; all others have")
     if floor_deviation:
         arguments["options"] = hmm.TrainingOptions(floor_deviation=floor_deviation)
     model: ParametricHMM = kind_class(

@@ -25,7 +25,6 @@ from paramove.phmm.network.networks import StateNetworks
 from paramove.phmm.network.training import NetworkParameters, NetworkPrior, SequenceMoments, train_networks
 from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import TrainingData
-from paramove.phmm.performance import Performances
 from paramove.phmm.regression import RegressedParameters, train_regressed
 from paramove.phmm.ridge import chosen_ridge
 
@@ -120,7 +119,7 @@ class NeuralPHMM(ExaminingPHMM):
         )
         self._set_learned(monomials, trained.networks, trained.covariances, trained.durations)
         units = replace(monomials, units=trained.networks.inner[-1])  # of the last state, where theta shows most
-        self.performances_ = Performances.fitted(data.recorded, data.theta, units, data.groups)
+        self.performances_ = self._fitted_performances(data, units)
 
     def _aligned(self, data: TrainingData, options: TrainingOptions) -> tuple[RegressedParameters, Monomials]:
         """A polynomial model that aligns frames and states."""
@@ -231,7 +230,7 @@ class NeuralPHMM(ExaminingPHMM):
             "durations": self.durations_,
             "theta_centre": self.monomials_.centre,
             "theta_scale": self.monomials_.scale,
-            **(self.performances_.arrays() if self.performances_ is not None else {}),
+            **self._performance_arrays(),
         }
 
     def _set_arrays(self, arrays: dict[str, Floats]) -> None:
@@ -252,7 +251,7 @@ class NeuralPHMM(ExaminingPHMM):
         check_local_models(*local, self.d_min_)
         self._set_learned(monomials, networks, arrays["covariances"], arrays["durations"])
         units = replace(monomials, units=networks.inner[-1])
-        self.performances_ = Performances.from_arrays(arrays, units)
+        self._set_performances(arrays, units)
 
 
 def _monomials(degree: int, theta: Floats) -> Monomials:
