@@ -8,7 +8,7 @@ A fold leaves out a whole direction, person or grid, never single repetitions at
 - `pointing/four corners`: the same per depth: four directions are learned, all others of that depth tested.
 - `pointing/planes`: per person, the middle column or the middle row of the targets is left out.
 - `table/<action>`: one person is left out; both hands together. Drinking counts up to the grasp.
-- `table/<action>, 5 persons`: five drawn persons are learned, each of the others is tested.
+- `table/<action>, 5 persons`, `table/actions, 5 persons`: five drawn persons are learned, the others tested.
 - `table/actions`: the kinds of movement, one person left out; whole movements.
 - `table/beginnings`: the same while they go on, all cut at their beginning by one absolute rule.
 - `table/first 100 ms` and more: the same, every movement is cut after that time.
@@ -103,8 +103,9 @@ def real_tasks(folder: Path | None = None) -> dict[str, list[Fold]]:
 def _table_tasks(table: Recordings) -> dict[str, list[Fold]]:
     with_target = [action for action in table.actions if np.isfinite(_targets(table.of(action=action))).all()]
     tasks = {f"table/{action}": _persons(table, action) for action in with_target}
-    tasks |= {f"table/{action}, {FEW_PERSONS} persons": _few_persons(table, action) for action in with_target}
+    tasks |= {name: _few_persons(table, name, [action], _TO_GRASP) for action in with_target for name in [_few(action)]}
     if len(table.actions) > 1:
+        tasks[_few("actions")] = _few_persons(table, _few("actions"), table.actions, _WHOLE)
         tasks["table/actions"] = _kinds(table, "table/actions", _WHOLE)
         tasks["table/beginnings"] = _kinds(table, "table/beginnings", _FROM_ONSET, beginnings=True)
         for milliseconds in FIRST_MS:
@@ -270,15 +271,19 @@ def _persons(table: Recordings, action: str) -> list[Fold]:
     return folds
 
 
-def _few_persons(table: Recordings, action: str) -> list[Fold]:
-    folds, name = [], f"table/{action}, {FEW_PERSONS} persons"
-    own = table.of(action=action)
+def _few(what: str) -> str:
+    return f"table/{what}, {FEW_PERSONS} persons"
+
+
+def _few_persons(table: Recordings, name: str, actions: Sequence[str], part: Part) -> list[Fold]:
+    folds = []
+    own = [one for action in actions for one in table.of(action=action)]
     subjects = sorted({one.subject for one in own})
     for draw in range(DRAWS if len(subjects) > FEW_PERSONS else 0):
         chosen = set(np.random.default_rng(draw).permutation(subjects)[:FEW_PERSONS].tolist())
-        train = _table_examples([one for one in own if one.subject in chosen], table.fingertip, _TO_GRASP)
+        train = _table_examples([one for one in own if one.subject in chosen], table.fingertip, part)
         for subject in sorted(set(subjects) - chosen):
-            test = _table_examples([one for one in own if one.subject == subject], table.fingertip, _TO_GRASP)
+            test = _table_examples([one for one in own if one.subject == subject], table.fingertip, part)
             folds.append(Fold(name, f"{draw}/{subject}", train, test, [], "place", table.fingertip))
     return folds
 

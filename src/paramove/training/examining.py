@@ -87,12 +87,18 @@ class Examiner:
     Args:
         classifier: of the actions; of a single model `MovementClassifier.from_models`.
 
-    Raises InputError for models with different points, frames or rates.
+    Raises InputError for models with different points, frames or rates, and for actions without theta.
     """
 
     def __init__(self, classifier: MovementClassifier) -> None:
         self.classifier = classifier
         self.models: Mapping[str, ParametricHMM] = classifier.models_
+        without = sorted(set(classifier.classes_) - set(self.models))
+        if without:
+            raise InputError(
+                f"these actions have no theta: {', '.join(without)}; ask MovementClassifier.load(FOLDER).classify in "
+                "Python, or train a folder of actions that have"
+            )
         self._about = [model.description or MovementDescription() for model in self.models.values()]
         for about in self._about[1:]:
             for what in ("point_names", "frame", "rate_hz"):
