@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -70,6 +70,18 @@ class Examples:
         return sorted(set(self.labels))
 
 
+def joined(parts: Iterable[Examples]) -> Examples:
+    """All movements of several."""
+    several = list(parts)
+    return Examples(
+        [x for part in several for x in part.sequences],
+        np.concatenate([part.theta for part in several]),
+        [label for part in several for label in part.labels],
+        np.concatenate([part.groups for part in several]),
+        several[0].rate_hz,
+    )
+
+
 @runtime_checkable
 class Method(Protocol):
     """A model under comparison. One object is fitted once per fold and then tested."""
@@ -78,6 +90,9 @@ class Method(Protocol):
 
     def fit(self, examples: Examples) -> None:
         """Learn. Of one action for synthesis, theta and outliers; of several for classification."""
+
+    def adapt(self, examples: Examples, own: Examples) -> None:
+        """After learning from examples of other persons, adapt to a person of whom there are a few movements."""
 
     def synthesize(self, theta: Floats, n: int) -> Floats:
         """The prototype movement for theta. Shape (n, D), m."""
@@ -103,6 +118,10 @@ class NotAble:
     def fit(self, examples: Examples) -> None:
         """Learn from examples."""
         raise NotImplementedError(f"{type(self).__name__} cannot learn")
+
+    def adapt(self, examples: Examples, own: Examples) -> None:
+        """Learns from all of them."""
+        self.fit(joined([examples, own]))
 
     def synthesize(self, theta: Floats, n: int) -> Floats:
         """Raises NotImplementedError."""

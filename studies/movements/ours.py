@@ -56,6 +56,10 @@ class Models(NotAble):
         self.classifier.fit(examples.sequences, examples.theta, list(labels), examples.groups)
         self.model = self.classifier.models_[self.classifier.classes_[0]]
 
+    def adapt(self, examples: Examples, own: Examples) -> None:
+        """Takes what was learned as the prior."""
+        self.model = self.model.adapt(own.sequences, own.theta)
+
     def synthesize(self, theta: Floats, n: int) -> Floats:
         """The prototype."""
         return self.model.synthesize(theta, n)

@@ -7,6 +7,7 @@ A fold leaves out a whole direction, person or grid, never single repetitions at
   tested on all others.
 - `pointing/four corners`: the same per depth: four directions are learned, all others of that depth tested.
 - `pointing/planes`: per person, the middle column or the middle row of the targets is left out.
+- `pointing/new person`: one person is left out; `pointing/new person, 3 movements`: but for three drawn movements.
 - `table/<action>`: one person is left out; both hands together. Drinking counts up to the grasp.
 - `table/<action>, 5 persons`, `table/actions, 5 persons`: five drawn persons are learned, the others tested.
 - `table/actions`: the kinds of movement, one person left out; whole movements.
@@ -20,8 +21,8 @@ A fold leaves out a whole direction, person or grid, never single repetitions at
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from pathlib import Path
 
@@ -41,12 +42,14 @@ from paramove.demonstrations import (
 )
 from paramove.documents import Floats
 from studies.movements.measures import ThetaKind
-from studies.movements.method import Examples
+from studies.movements.method import Examples, joined
 from studies.movements.per_action import first_frames
 
 GRID_ACTIONS = ("reaching", "pointing")
 FIRST_MS = (100, 200, 400)
 FEW_PERSONS, DRAWS = 5, 2
+KNOWN, ADAPTATIONS = 3, 4
+"""How many movements of a new person are known, and how often these are drawn."""
 REPETITIONS = (1, 2, 5, 20)
 SCRIPTED = {"same": 0.0, "3 mm": 0.003}
 """Standard deviation of where scripted movements begin and end, m."""
@@ -64,6 +67,7 @@ class Fold:
         kind: what theta is.
         tip: which body point is the fingertip.
         beginnings: the kind is estimated while the movement goes on.
+        own: a few movements of the person who is tested, to adapt to.
     """
 
     task: str
@@ -74,6 +78,7 @@ class Fold:
     kind: ThetaKind
     tip: int
     beginnings: bool = False
+    own: Examples | None = None
 
     @property
     def several_actions(self) -> bool:
@@ -95,6 +100,8 @@ def real_tasks(folder: Path | None = None) -> dict[str, list[Fold]]:
         pointing = load_recordings("pointing27", root)
         tasks |= {"pointing/direction": _directions(pointing), "pointing/corners": _corners(pointing)}
         tasks |= {"pointing/four corners": _four_corners(pointing), "pointing/planes": _planes(pointing)}
+        tasks |= {"pointing/new person": _new_persons(pointing, 0, 1)}
+        tasks |= {f"pointing/new person, {KNOWN} movements": _new_persons(pointing, KNOWN, ADAPTATIONS)}
     if "table_reach" in present:
         tasks |= _table_tasks(load_recordings("table_reach", root))
     return {name: folds for name, folds in tasks.items() if folds}
@@ -125,7 +132,7 @@ def grid_tasks(seeds: Sequence[int] = (0, 1, 2, 3, 4)) -> dict[str, list[Fold]]:
             tasks[f"raster/{action}"].append(
                 Fold(f"raster/{action}", str(seed), train[action], test[action], others, "raster", 5)
             )
-        both, tests = _joined(train.values()), _joined(test.values())
+        both, tests = joined(train.values()), joined(test.values())
         tasks["raster/actions"].append(Fold("raster/actions", str(seed), both, tests, [], "raster", 5))
         tasks["raster/beginnings"].append(Fold("raster/beginnings", str(seed), both, tests, [], "raster", 5, True))
     return tasks
@@ -224,6 +231,21 @@ def _planes(pointing: Recordings) -> list[Fold]:
     return folds
 
 
+def _new_persons(pointing: Recordings, n_known: int, draws: int) -> list[Fold]:
+    folds, name = [], f"pointing/new person, {n_known} movements" if n_known else "pointing/new person"
+    for number, subject in enumerate(pointing.subjects):
+        train = [one for one in pointing.movements if one.subject != subject]
+        tested = list(pointing.of(subject=subject))
+        for draw in range(draws if train else 0):
+            chosen = set(np.random.default_rng([number, draw]).permutation(len(tested))[:n_known].tolist())
+            others = [one for number, one in enumerate(tested) if number not in chosen]
+            fold = _pointing_fold(name, f"{subject}/{draw}", pointing, train, others, by_person=True)
+            known = [tested[number] for number in sorted(chosen)]
+            own = _pointing_fold(name, "", pointing, known, [], by_person=True).train if known else None
+            folds.append(replace(fold, own=own))
+    return folds
+
+
 def _levels(values: Floats) -> list[float]:
     """Centres of clusters of positions that lie farther apart than a tenth of their range."""
     ordered = np.sort(values)
@@ -244,14 +266,15 @@ def corner_targets(positions_by_target: dict[int, Floats]) -> set[int]:
 
 
 def _pointing_fold(
-    task: str, name: str, recordings: Recordings, train: list[RecordedMovement], test: list[RecordedMovement]
-) -> Fold:
+    task: str, name: str, recordings: Recordings, train: list[RecordedMovement], test: list[RecordedMovement],
+    by_person: bool = False,
+) -> Fold:  # fmt: skip
     def examples(movements: list[RecordedMovement]) -> Examples:
         return Examples(
             [one.movement for one in movements],
             np.array([one.direction for one in movements]),
             [one.action for one in movements],
-            np.array([one.target_id for one in movements]),
+            np.array([recordings.subjects.index(one.subject) if by_person else one.target_id for one in movements]),
             RATE_HZ,
         )
 
@@ -332,14 +355,3 @@ def _grid(action: str, columns: int, rows: int, repetitions: int, seed: Sequence
     theta = np.repeat(coordinates, repetitions, axis=0)
     cells = np.repeat(np.arange(len(targets)), repetitions)
     return Examples(demonstrations.sequences, theta, [action] * len(theta), cells, SAMPLE_RATE_HZ)
-
-
-def _joined(parts: Iterable[Examples]) -> Examples:
-    several = list(parts)
-    return Examples(
-        [x for part in several for x in part.sequences],
-        np.concatenate([part.theta for part in several]),
-        [label for part in several for label in part.labels],
-        np.concatenate([part.groups for part in several]),
-        several[0].rate_hz,
-    )

@@ -42,6 +42,8 @@ def measure(method: Method, fold: Fold) -> dict[str, Any]:
     """Fit and test. Per measure one value per test movement, and seconds: `fit`, and per question on average."""
     began = time.perf_counter()
     method.fit(fold.train)
+    if fold.own is not None:
+        method.adapt(fold.train, fold.own)
     seconds = {"fit": time.perf_counter() - began}
     values: Numbers = {}
     if fold.several_actions:

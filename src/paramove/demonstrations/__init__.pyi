@@ -15,6 +15,7 @@ from .blending import redirect_demonstrations as redirect_demonstrations
 from .blending import redirect_from_model as redirect_from_model
 from .blending import train_pointing_model as train_pointing_model
 from .body_frame import BODY as BODY
+from .body_frame import chain_length as chain_length
 from .body_frame import in_body_frame as in_body_frame
 from .body_frame import mirrored as mirrored
 from .demonstration_set import DemonstrationSet as DemonstrationSet

@@ -6,6 +6,7 @@ The body frame has its origin where the shoulder of the moving arm is at the beg
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -64,9 +65,15 @@ def mirrored(movement: Movement) -> Movement:
 
 def arm_length(movement: Movement) -> float:
     """Upper arm and forearm together: medians over the movement, m."""
-    points = [movement.point(name) for name in ARM_CHAIN]
-    pieces = [np.linalg.norm(b - a, axis=1) for a, b in itertools.pairwise(points)]
-    return float(sum(np.median(piece) for piece in pieces))
+    return chain_length([movement.point(name) for name in ARM_CHAIN])
+
+
+def chain_length(points: Sequence[Floats]) -> float:
+    """Sum of the median distances between successive points, (T, 3) each, such as shoulder, elbow and wrist.
+
+    Movements of persons of different size are alike after a division by the length of the arm.
+    """
+    return float(sum(np.median(np.linalg.norm(b - a, axis=1)) for a, b in itertools.pairwise(points)))
 
 
 def scaled(movement: Movement, factor: float) -> Movement:

@@ -5,7 +5,6 @@ flat_time (frames,) in s, offsets (movements + 1,), points, unit, axes, and per 
 repetition, segment (first frame, one past the last), ok; `hand` and `segment_grasp` where there are several.
 """
 
-import itertools
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.demonstrations.body_frame import chain_length
 from paramove.documents import Floats, InputError, Ints, read_arrays
 
 Bools = NDArray[np.bool_]
@@ -269,8 +269,7 @@ def _facing(own: list[_Raw], hands: list[str], shoulder: int, sternum: int | Non
 def _arm_length(own: list[_Raw], chain: tuple[int, ...]) -> float:
     """Sum of the median lengths of the arm's links over all frames of the person, m."""
     points = np.concatenate([raw.points for raw in own])
-    links = itertools.pairwise(chain)
-    return float(sum(np.median(np.linalg.norm(points[:, a] - points[:, b], axis=1)) for a, b in links))
+    return chain_length([points[:, number] for number in chain])
 
 
 def _in_body_frame(

@@ -9,7 +9,7 @@ otherwise the average would follow one fraction at a time.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -19,6 +19,7 @@ from scipy.special import softmax
 
 from paramove.documents import Floats, Ints
 from paramove.hmm import resample
+from paramove.phmm.adaptation import Adaptation
 from paramove.phmm.correlated_regression import CondensedRegressions, CorrelatedRegression
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise
@@ -84,6 +85,15 @@ class Beginnings:
         lengths = np.log([len(sequence) for sequence in sequences])
         outside = LEAST_DURATION_MARGIN + float(lengths.std())
         return cls(tuple(regressions), increments, (float(lengths.min()) - outside, float(lengths.max()) + outside))
+
+    def adapted(self, sequences: Sequence[Floats], theta: Floats, adaptation: Adaptation) -> Beginnings:
+        """Of the person whose movements at theta (K, P) these are."""
+
+        def of(regression: CorrelatedRegression, fraction: float) -> CorrelatedRegression:
+            y = np.stack([points_of(x[: _n_frames(len(x), fraction)], self.increments) for x in sequences])
+            return regression.adapted(y, theta, adaptation)
+
+        return replace(self, regressions=tuple(map(of, self.regressions, FRACTIONS)))
 
     def examined(self, sequence: Floats, margin: float, noise: AddedNoise | None = None) -> ExaminedBeginning:
         """A beginning (T, D), with noise beyond that of the training; `margin` as `CorrelatedRegression.estimate`.

@@ -20,6 +20,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from paramove.documents import Floats, Ints
+from paramove.phmm.adaptation import WITHIN, Adaptation
 from paramove.phmm.features import Monomials
 from paramove.phmm.left_out import folds_of, inflation_of, one_theta_each
 from paramove.phmm.noise import distances_with_noise
@@ -156,6 +157,16 @@ class CorrelatedRegression:
         """`distance` of many movements (K, n) from those of theta (K, P). Shape (K,)."""
         self._check_length(y[0])
         return self.condensed.distances_from(y, theta)
+
+    def adapted(self, y: Floats, theta: Floats, adaptation: Adaptation) -> CorrelatedRegression:
+        """Of the person whose movements (K, n) at theta (K, P) these are."""
+        missed = y - self.monomials.at(theta) @ self.coefficients.T
+        return replace(
+            self,
+            coefficients=self.coefficients + adaptation.change(missed),
+            uncertainty=adaptation.remaining(self.uncertainty) / WITHIN,
+            root=np.sqrt(WITHIN) * self.root,
+        )
 
     def widened(self, covariance: Floats) -> CorrelatedRegression:
         """With noise of that covariance (n, n) in every movement."""

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Literal, NamedTuple, TypeGuard, get_args
+from collections.abc import Sequence
+from copy import copy
+from typing import Literal, NamedTuple, Self, TypeGuard, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.documents import Floats, renamed_attribute
-from paramove.hmm import check_length, checked_sequence
+from paramove.hmm import check_length, checked_sequence, checked_sequences
+from paramove.phmm.adaptation import Adaptation
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise
-from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
-from paramove.phmm.performance import Performances, movement_parts
+from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData, checked_theta
+from paramove.phmm.performance import Performances, movement_parts, state_averages
 
 Residuals = Literal["independent", "correlated"]
 
@@ -113,6 +116,42 @@ class ExaminingPHMM(ParametricHMM):
         parts = movement_parts(recorded)
         theta, covariance = performances.estimate(parts, self.search_margin)
         return ParameterEstimate(theta, covariance, self._log_likelihood_at(checked, theta)), parts
+
+    def adapt(self, sequences: Sequence[ArrayLike], theta: ArrayLike | None = None) -> Self:
+        """This model of other persons, adapted to a person of whom there are a few movements: about three suffice.
+
+        Args:
+            sequences: movements of the person, (T_k, D) each.
+            theta: their labels, (K, P). Without them only what is synthesised adapts, since a habit of the person and
+                an effect of theta cannot be distinguished: estimates and regions stay those of an unknown person.
+
+        Raises NotFittedError before training, ValueError for sequences and labels that do not fit.
+        """
+        self._check_trained()
+        recorded = [checked_sequence(one, self.covariances_.shape[-1]) for one in checked_sequences(sequences)]
+        known = np.array([self.estimate(one).theta for one in recorded]) if theta is None else theta
+        labels = self._checked_theta(checked_theta(known, len(recorded)))
+        averages = []
+        for sequence, one in zip(recorded, labels, strict=True):
+            frames = self._checked(sequence)
+            averages.append(state_averages(self.at(one).responsibilities(frames).T, frames)[0])
+        adaptation = Adaptation.of(self.monomials_, labels)
+        missed = np.stack(averages) - self.state_means(labels)
+        change = adaptation.change(missed.reshape(len(labels), -1))
+        model = copy(self)
+        model._move_means(change.reshape(*missed.shape[1:], -1))
+        if self.log_frames_ is not None:
+            linear = Monomials.of_degree(1, np.asarray(self.parameter_bounds_)).at(labels)
+            late = np.log([[len(sequence)] for sequence in recorded]) - (linear @ self.log_frames_)[:, None]
+            model.log_frames_ = self.log_frames_ + adaptation.change(late)[0, : linear.shape[1]]
+        if theta is not None and self.performances_ is not None:
+            whole = Adaptation.of(self.performances_.complete.monomials, labels)
+            model.performances_ = self.performances_.adapted(recorded, labels, whole)
+        return model
+
+    @abstractmethod
+    def _move_means(self, change: Floats) -> None:
+        """Add coefficients of the monomials (N, D, F) to the means; changes a copy of a trained model."""
 
     def _fitted_performances(self, data: TrainingData, features: Monomials | None = None) -> Performances | None:
         """Distribution of whole executions with these features of theta; None with independent residuals."""

@@ -179,6 +179,11 @@ class InterpolativePHMM(ExaminingPHMM):
         super()._expect(noise)
         self._prepared = None
 
+    def _move_means(self, change: Floats) -> None:
+        features = self.monomials_.at(self.grid_.points())
+        self.means_ = self.means_ + np.einsum("ndf,gf->gnd", change, features)
+        self._prepared = None
+
     def _kernel_arrays(self) -> tuple[Any, ...]:
         """Grid lines (P, maximum), their numbers (P,), and the local models as the kernels take them."""
         if self._prepared is None:

@@ -149,6 +149,10 @@ class ParametricHMM(ABC):
         """
 
     @abstractmethod
+    def adapt(self, sequences: Sequence[ArrayLike], theta: ArrayLike | None = None) -> Self:
+        """This model of other persons, adapted to a person of whom there are a few movements (T_k, D)."""
+
+    @abstractmethod
     def state_means(self, theta: ArrayLike) -> Floats:
         """Means of all states for one theta (P,) or many (M, P). Shape (N, D) or (M, N, D)."""
 

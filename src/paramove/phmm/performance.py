@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from paramove.documents import Floats, Ints
 from paramove.hmm import resample
+from paramove.phmm.adaptation import Adaptation
 from paramove.phmm.beginnings import Beginnings, ExaminedBeginning
 from paramove.phmm.correlated_regression import CorrelatedRegression
 from paramove.phmm.features import Monomials
@@ -105,6 +106,16 @@ class Performances:
         beginnings = Beginnings.fitted(sequences, theta, monomials, groups, complete.ridge)
         pace = Pace.fitted(sequences, groups)
         return cls(complete, beginnings, pace, late if late_error < error else estimating)
+
+    def adapted(self, sequences: Sequence[Floats], theta: Floats, adaptation: Adaptation) -> Performances:
+        """Of the person whose movements at theta (K, P) these are."""
+        parts, n_last = np.stack([movement_parts(sequence) for sequence in sequences]), len(self.estimating.root)
+        return replace(
+            self,
+            complete=self.complete.adapted(parts, theta, adaptation),
+            estimating=self.estimating.adapted(parts[:, -n_last:], theta, adaptation),
+            beginnings=self.beginnings.adapted(sequences, theta, adaptation),
+        )
 
     def expecting(self, noise: AddedNoise) -> Performances:
         """The same for a sequence with noise."""

@@ -165,6 +165,10 @@ class PolynomialPHMM(ExaminingPHMM):
         super()._expect(noise)
         self._white = None
 
+    def _move_means(self, change: Floats) -> None:
+        self.coefficients_ = self.coefficients_ + change
+        self._white = None
+
     @property
     def _widest(self) -> float:
         return 1.0 + 2.0 * self.search_margin

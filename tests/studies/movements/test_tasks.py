@@ -15,6 +15,8 @@ def test_all_tasks_follow_from_the_folder(tasks: dict[str, list[Fold]]) -> None:
         "pointing/corners": 2,
         "pointing/four corners": 2,
         "pointing/planes": 2 * 2,
+        "pointing/new person": 2,
+        "pointing/new person, 3 movements": 2 * 4,
         "table/across": 3,
         "table/forward": 3,
         "table/actions": 3,

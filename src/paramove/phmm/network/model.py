@@ -169,6 +169,10 @@ class NeuralPHMM(ExaminingPHMM):
         super()._expect(noise)
         self._evaluator = None
 
+    def _move_means(self, change: Floats) -> None:
+        self.networks_ = replace(self.networks_, skip=self.networks_.skip + change)
+        self._evaluator = None
+
     def _expectation(self, position: Floats, prepared: search_kernels.Movement) -> tuple[float, Floats, Floats]:
         """ln p, its gradient and the information of the means in scaled theta, at one position.
 
