@@ -37,7 +37,7 @@ def _of_two_coordinates(model: InterpolativePHMM) -> None:
     model.grid_ = ParameterGrid(grid.origin[:2], grid.edges[:2, :2], grid.knots[:2])
     model.means_, model.covariances_ = model.means_[::2], model.covariances_[::2]
     model.durations_, model.parameter_bounds_ = model.durations_[::2], np.zeros((2, 2))
-    model.log_frames_ = np.zeros(3)
+    model.log_frames_, model.residuals, model.performances_ = np.zeros(3), "independent", None
 
 
 def _standing_still(model: InterpolativePHMM) -> None:
