@@ -134,9 +134,17 @@ def test_something_else_is_refused(tmp_path: Path) -> None:
 
 def test_missing_grid_points_are_named() -> None:
     rng = np.random.default_rng(0)
-    theta = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
-    with pytest.raises(ValueError, match=r"no training sequences at 1 of 4 points of the 2 x 2 grid: \[\[1.0, 1.0\]\]"):
+    theta = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 0.0]])
+    with pytest.raises(ValueError, match=r"no training sequences at 1 of 4 points of the grid: \[\[1.0, 1.0\]\]"):
         InterpolativePHMM(20, 2, 4).fit([movement(one, rng) for one in theta], theta)
+
+
+def test_directions_form_no_grid_and_the_message_says_what_does() -> None:
+    rng = np.random.default_rng(0)
+    angles = rng.uniform(-0.4, 0.4, (20, 2))
+    theta = np.column_stack([np.cos(angles[:, 0]), np.sin(angles[:, 0]), np.sin(angles[:, 1])])
+    with pytest.raises(ValueError, match=r"20 x 20 x 20 points .* the 20 sequences; .*QuadraticPHMM"):
+        InterpolativePHMM(20, 2, 4).fit([movement(one, rng) for one in angles], theta)
 
 
 def test_labels_off_a_given_grid_are_named() -> None:

@@ -12,6 +12,7 @@ from .network.model import NeuralPHMM as NeuralPHMM
 from .parametric import ParameterEstimate as ParameterEstimate
 from .parametric import ParametricHMM as ParametricHMM
 from .performance import groups_of as groups_of
+from .plausibility import UnlikelyMovementWarning as UnlikelyMovementWarning
 from .polynomial import CubicPHMM as CubicPHMM
 from .polynomial import LinearPHMM as LinearPHMM
 from .polynomial import PolynomialPHMM as PolynomialPHMM

@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from paramove.documents import Floats, renamed_attribute
 from paramove.hmm import checked_sequence, checked_sequences, not_fitted
 from paramove.phmm.discriminant import Discriminant, discriminant_for, discriminants
-from paramove.phmm.examining import has_p_values
+from paramove.phmm.examining import ExaminingPHMM, has_p_values
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
 from paramove.phmm.performance import groups_of
 from paramove.phmm.polynomial import QuadraticPHMM
@@ -126,6 +126,8 @@ class MovementClassifier:
             scores = np.array([score for _, score, _ in results.values()])
             log_posterior = scores - logsumexp(scores)
         best = self.classes_[int(log_posterior.argmax())]
+        if best in self.models_:
+            self.models_[best]._warn(checked, finished)
         posterior = {action: float(np.exp(value)) for action, value in zip(self.classes_, log_posterior, strict=True)}
         return Classification(best, posterior, {action: one for action, (one, _, _) in results.items()}, p_values[best])
 
@@ -209,10 +211,12 @@ def _result(model: ParametricHMM, sequence: Floats, finished: bool) -> tuple[Par
     Scores of models with correlated residuals are logarithms of p-values: densities of movements that lie far from
     every model (another person's) would compare the widths of the models instead of the distances from them.
     """
+    assert isinstance(model, ExaminingPHMM)
+    recorded = checked_sequence(sequence, model.covariances_.shape[-1])
     if has_p_values(model):
-        examination = model.examine(sequence, finished=finished)
+        examination = model._expecting_noise_of(recorded)._examined(recorded, finished)
         return examination.estimate, examination.log_p_value, examination.p_value
-    estimate = model.estimate(sequence, finished=finished)
+    estimate = model._estimate(recorded, finished)
     # Neighbouring frames are redundant: the frames of a state count as one.
     frames = model.resampled_frames_ or len(sequence)
     return estimate, estimate.log_likelihood * model.n_states / frames, 1.0

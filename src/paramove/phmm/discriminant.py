@@ -105,7 +105,10 @@ class Discriminant:
         )
 
     def _distances_of(self, sequence: Floats) -> Floats:
-        return self.distances(discriminant_features(sequence, self.n_frames)[None])
+        features = discriminant_features(sequence, self.n_frames)
+        if len(features) != len(self.root):
+            raise ValueError(f"expected frames with the coordinates of the training, found {sequence.shape[1]}")
+        return self.distances(features[None])
 
     def distances(self, features: Floats) -> Floats:
         """Squared, of movements with features (K, n) from the means of the actions. Shape (K, A)."""

@@ -75,16 +75,29 @@ class ExaminingPHMM(ParametricHMM):
     def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
         """The most likely theta, its covariance, and the log-likelihood there, of a movement or of its beginning.
 
-        Theta follows from `movement_parts` by generalised least squares. A beginning (`finished=False`) has the frame
-        rate of the training; its log-likelihood is that of its points.
+        Theta follows from `movement_parts` by generalised least squares; with independent residuals it is the maximum
+        of the likelihood of frames. A beginning (`finished=False`) has the frame rate of the training; its
+        log-likelihood is that of its points.
         """
+        return self._estimate(self._recorded(sequence, finished), finished)
+
+    def _estimate(self, recorded: Floats, finished: bool) -> ParameterEstimate:
+        model = self._expecting_noise_of(recorded)
         if not finished:
-            return self.examine(sequence, finished=False).estimate
+            return model._examined(recorded, finished).estimate
+        if model.performances_ is None:
+            return model._most_likely(recorded)
+        return model._estimated(recorded, model.performances_)[0]
+
+    def _recorded(self, sequence: ArrayLike, finished: bool) -> Floats:
         self._check_trained()
         recorded = checked_sequence(sequence, self.covariances_.shape[-1])
-        model = self._expecting_noise_of(recorded)
-        assert model.performances_ is not None
-        return model._estimated(recorded, model.performances_)[0]
+        self._warn(recorded, finished)
+        return recorded
+
+    def _most_likely(self, recorded: Floats) -> ParameterEstimate:
+        """Of a complete movement of independent frames, with noise as in the training."""
+        raise NotImplementedError(f"a {type(self).__name__} has correlated residuals")
 
     def examine(self, sequence: ArrayLike, *, finished: bool = True) -> Examination:
         """Estimate of theta, outlier score and p-value of the sequence.
@@ -92,13 +105,12 @@ class ExaminingPHMM(ParametricHMM):
         Raises ValueError for a model with independent residuals, which has no distribution of executions, and for a
         beginning of fewer frames than are modelled.
         """
-        self._check_trained()
+        recorded = self._recorded(sequence, finished)
+        return self._expecting_noise_of(recorded)._examined(recorded, finished)
+
+    def _examined(self, recorded: Floats, finished: bool) -> Examination:
         if self.performances_ is None:
             raise ValueError("this model has independent residuals: train it with residuals='correlated'")
-        recorded = checked_sequence(sequence, self.covariances_.shape[-1])
-        model = self._expecting_noise_of(recorded)
-        if model is not self:
-            return model.examine(recorded, finished=finished)
         if not finished:
             found = self.performances_.examined_beginning(recorded, self.search_margin)
             estimate = ParameterEstimate(found.theta, found.covariance, found.log_density)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
-from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions, checked_sequence
+from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
 from paramove.phmm import interpolation_kernels, interpolation_search
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.examining import ExaminingPHMM, Residuals, inverse_information
@@ -20,6 +20,7 @@ from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import ParameterEstimate, TrainingData
 from paramove.phmm.synchronisation import synchronised
 
+REMEDY = "demonstrate every point of a grid, or train a QuadraticPHMM, which needs none"
 SMOOTHING = 0.3
 """Factor on squared distances where the search begins: covariances are widened by its inverse (paper 5.3)."""
 
@@ -149,20 +150,8 @@ class InterpolativePHMM(ExaminingPHMM):
         """Covariance of the pose at progress tau (6.3). Shape (D, D); for many theta and tau: (M, D, D)."""
         return self._at_progress(self.covariances_, theta, tau, clamped=True)
 
-    def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
-        """The most likely theta, its covariance, and the log-likelihood there, of a movement or of its beginning.
-
-        With independent residuals the maximum of the likelihood (thesis 3.4.4); the covariance is the inverse
-        information, which is far too small. With correlated ones theta follows from `movement_parts`, by generalised
-        least squares. A beginning (`finished=False`) has the frame rate of the training.
-        """
-        if not finished or self.performances_ is not None:
-            return super().estimate(sequence, finished=finished)
-        self._check_trained()
-        recorded = checked_sequence(sequence, self.means_.shape[-1])
-        model = self._expecting_noise_of(recorded)
-        if model is not self:
-            return model.estimate(recorded)
+    def _most_likely(self, recorded: Floats) -> ParameterEstimate:
+        """The maximum of the likelihood (thesis 3.4.4); its covariance is the inverse information: far too small."""
         columns, arrays = np.ascontiguousarray(self._checked(recorded).T), self._kernel_arrays()
         best, value, cell = interpolation_search.likeliest(self.search_margin, SMOOTHING, columns, *arrays)
         information = interpolation_kernels.expectation_at(best, cell, 1.0, columns, *arrays)[2]
@@ -248,6 +237,9 @@ def grouped(sequences: list[Floats], theta: Floats, grid: ParameterGrid) -> list
     """Sequences per grid point. Raises ValueError naming labels off the grid and grid points without sequences."""
     if theta.shape[1] != grid.dimension:
         raise ValueError(f"theta has {theta.shape[1]} components, the grid has {grid.dimension}")
+    if grid.size > len(theta):
+        shape = " x ".join(map(str, grid.shape))
+        raise ValueError(f"a grid of {shape} points has more points than the {len(theta)} sequences; {REMEDY}")
     index, distance = grid.nearest(theta)
     if (distance > 0.1).any():
         worst = int(distance.argmax())
@@ -261,6 +253,5 @@ def grouped(sequences: list[Floats], theta: Floats, grid: ParameterGrid) -> list
         groups[number].append(sequence)
     empty = [np.round(grid.points()[number], 4).tolist() for number, group in enumerate(groups) if not group]
     if empty:
-        shape = " x ".join(map(str, grid.shape))
-        raise ValueError(f"no training sequences at {len(empty)} of {grid.size} points of the {shape} grid: {empty}")
+        raise ValueError(f"no training sequences at {len(empty)} of {grid.size} points of the grid: {empty}; {REMEDY}")
     return groups

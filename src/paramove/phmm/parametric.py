@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from copy import copy
@@ -36,6 +37,7 @@ from paramove.phmm.description import MovementDescription
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, NoiseLevel
 from paramove.phmm.performance import groups_of
+from paramove.phmm.plausibility import TrainingRange, UnlikelyMovementWarning
 from paramove.phmm.ridge import smoothed
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 
@@ -87,6 +89,7 @@ class ParametricHMM(ABC):
             models made of given HMMs.
         flat_theta_: whether theta of the training was (K,), which `predict` then returns.
         training_noise_: noise of the training; None in files of earlier releases, which then ignore noise.
+        training_range_: unit, durations and speeds of the training; None in models made of given HMMs.
         training_: summary of the training.
     """
 
@@ -109,6 +112,7 @@ class ParametricHMM(ABC):
         self.parameter_bounds_: Floats | None = None
         self.training_theta_: Floats | None = None
         self.training_noise_: NoiseLevel | None = None
+        self.training_range_: TrainingRange | None = None
         self.flat_theta_ = False
         self.log_frames_: Floats | None = None
         self.training_: TrainingSummary | None = None
@@ -146,7 +150,16 @@ class ParametricHMM(ABC):
         """The parameter that makes a sequence most likely (thesis 4.1.2.3).
 
         With `finished=False` the sequence is the beginning of a movement, at the frame rate of the training.
+
+        Raises ValueError for another unit than that of the training. Warns (`UnlikelyMovementWarning`) of sequences
+        that seem to have another frame rate, or to be no complete movement.
         """
+
+    def remarks(self, sequence: ArrayLike, *, finished: bool = True) -> tuple[str, ...]:
+        """What makes a sequence hardly a movement, or the beginning of one, at the frame rate of the training."""
+        if self.training_range_ is None:
+            return ()
+        return self.training_range_.remarks(checked_sequence(sequence), finished)
 
     @abstractmethod
     def adapt(self, sequences: Sequence[ArrayLike], theta: ArrayLike | None = None) -> Self:
@@ -187,6 +200,7 @@ class ParametricHMM(ABC):
         self.parameter_bounds_ = np.stack([labels.min(axis=0), labels.max(axis=0)])
         self.training_theta_ = np.unique(labels, axis=0)
         self.training_noise_ = NoiseLevel.of(recorded)
+        self.training_range_ = TrainingRange.of(recorded)
         self.flat_theta_ = np.ndim(theta) == 1
         linear, log_frames = Monomials.of_degree(1, labels), np.log([[len(sequence)] for sequence in recorded])
         self.log_frames_ = smoothed(linear.at(labels), linear.degrees, log_frames, numbers)[0]
@@ -305,6 +319,8 @@ class ParametricHMM(ABC):
             arrays["training_theta"] = self.training_theta_
         if self.training_noise_ is not None:
             arrays["training_noise"] = self.training_noise_.array()
+        if self.training_range_ is not None:
+            arrays["training_range"] = self.training_range_.array()
         write_record(Path(path), ModelRecord(type(self).__name__, self.get_params(), self.training_, arrays))
 
     @classmethod
@@ -332,6 +348,8 @@ class ParametricHMM(ABC):
                 raise ValueError(f"expected one more log_frames than parameters, found {model.log_frames_.shape}")
             noise = arrays.pop("training_noise", None)
             model.training_noise_ = None if noise is None else NoiseLevel.from_array(noise)
+            seen = arrays.pop("training_range", None)
+            model.training_range_ = None if seen is None else TrainingRange.from_array(seen)
             model._set_arrays(arrays)
         except KeyError as error:
             names = ", ".join(sorted(record.arrays)) or "none"
@@ -355,6 +373,13 @@ class ParametricHMM(ABC):
 
     def _expect(self, noise: AddedNoise) -> None:  # noqa: B027 (a model may leave noise to the likelihood)
         """Expect this noise in sequences; changes a copy of a trained model."""
+
+    def _warn(self, recorded: Floats, finished: bool) -> None:
+        """Of what is unusual about a sequence. Raises ValueError for another unit."""
+        if self.training_range_ is not None:
+            self.training_range_.check_unit(recorded)
+            for remark in self.training_range_.remarks(recorded, finished):
+                warnings.warn(remark, UnlikelyMovementWarning, stacklevel=4)
 
     def _check_trained(self) -> None:
         if self.parameter_bounds_ is None:

@@ -15,7 +15,6 @@ from paramove.hmm import (
     LeftRightHMM,
     Parameters,
     TrainingOptions,
-    checked_sequence,
     equal_segments,
 )
 from paramove.phmm import search_kernels
@@ -137,20 +136,9 @@ class PolynomialPHMM(ExaminingPHMM):
         value, gradient, _ = search_kernels.expectation_at(u, self._prepared(self._checked(sequence)))
         return float(value), gradient / self.monomials_.scale
 
-    def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
-        """The most likely theta, its covariance, and the log-likelihood there, of a movement or of its beginning.
-
-        With independent residuals the maximum of the likelihood, by EM (3.5), generalised where means are not linear.
-        With correlated ones theta follows from `movement_parts`, by generalised least squares. A beginning
-        (`finished=False`) has the frame rate of the training; its log-likelihood is that of its points.
-        """
-        if not finished or self.performances_ is not None:
-            return super().estimate(sequence, finished=finished)
-        self._check_trained()
-        model = self._expecting_noise_of(checked_sequence(sequence, self.covariances_.shape[-1]))
-        if model is not self:
-            return model.estimate(sequence)
-        prepared = self._prepared(self._checked(sequence))
+    def _most_likely(self, recorded: Floats) -> ParameterEstimate:
+        """The maximum of the likelihood, by EM (3.5), generalised where means are not linear."""
+        prepared = self._prepared(self._checked(recorded))
         best, value, gradient = self._likeliest(prepared)
         information = search_kernels.information_at(best, gradient, prepared)
         scale = self.monomials_.scale

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,7 +12,14 @@ from scipy.special import chdtri  # scipy.stats would take half a second to impo
 
 from paramove.demonstrations import BODY, DemonstrationError, Movement, in_body_frame, mirrored, resampled
 from paramove.documents import Floats, InputError, renamed_attribute
-from paramove.phmm import MovementClassifier, MovementDescription, ParameterEstimate, ParametricHMM, has_p_values
+from paramove.phmm import (
+    MovementClassifier,
+    MovementDescription,
+    ParameterEstimate,
+    ParametricHMM,
+    UnlikelyMovementWarning,
+    has_p_values,
+)
 from paramove.training.drawing import bounds, parameter_names
 from paramove.training.kinds import kind_of
 from paramove.training.leaving_out import REGION, covers
@@ -35,6 +43,7 @@ class Recognition:
         parameter_names: of the components of theta.
         p_value: probability that a genuine movement has at least this outlier score; None from models without p-values.
         outside: names of the parameters whose estimates are outside the bounds of the training.
+        remarks: what makes it hardly a movement, or a beginning, at the frame rate of the training.
         labelled: theta of the label, as far as the model has its parameters; None without a label.
     """
 
@@ -46,6 +55,7 @@ class Recognition:
     parameter_names: tuple[str, ...]
     p_value: float | None
     outside: tuple[str, ...]
+    remarks: tuple[str, ...]
     labelled: Floats | None
 
     typicality = renamed_attribute("typicality", "p_value")
@@ -69,6 +79,7 @@ class Recognition:
             "theta_region_95": dict(zip(self.parameter_names, self.half_widths.tolist(), strict=True)),
             "theta_covariance": self.estimate.covariance.tolist(),
             "theta_outside_bounds": list(self.outside),
+            "remarks": list(self.remarks),
             "p_value": self.p_value,
             "typicality": self.p_value,  # the old name, for one release
             "log_likelihood": self.estimate.log_likelihood,
@@ -136,7 +147,9 @@ class Examiner:
         """Recognises a movement, or its beginning. Raises InputError with the reason if that is impossible."""
         prepared = self.prepared(movement)
         try:
-            action, posterior, estimate, p_value = self._classified(prepared, finished)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UnlikelyMovementWarning)  # they are the remarks
+                action, posterior, estimate, p_value = self._classified(prepared, finished)
         except ValueError as error:
             raise DemonstrationError(f"{movement.source}: {error}") from error
         model = self.models[action]
@@ -149,7 +162,8 @@ class Examiner:
         )
         known = p_value is None or p_value >= SIGNIFICANCE_LEVEL
         labelled = _labelled(prepared, names)
-        return Recognition(prepared, action, known, posterior, estimate, names, p_value, outside, labelled)
+        remarks = model.remarks(prepared.frames, finished=finished)
+        return Recognition(prepared, action, known, posterior, estimate, names, p_value, outside, remarks, labelled)
 
     def _classified(
         self, movement: Movement, finished: bool
