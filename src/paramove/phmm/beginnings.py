@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.special import softmax
 
 from paramove.documents import Floats, Ints
-from paramove.hmm import resample
+from paramove.hmm import interpolate, resample
 from paramove.phmm.adaptation import Adaptation
 from paramove.phmm.correlated_regression import CondensedRegressions, CorrelatedRegression
 from paramove.phmm.features import Monomials
@@ -71,29 +71,36 @@ class Beginnings:
 
         Points or increments, whichever predict theta of left-out groups better: what shrinkage takes for chance
         depends on it. People begin where they are, and direct the increments; scripts and robots pass their points.
+        Shrinkage is chosen where they are compared, and is the same for neighbours.
         """
 
-        def of(number: int, increments: bool) -> tuple[CorrelatedRegression, float]:
-            y = np.stack([points_of(x[: _n_frames(len(x), FRACTIONS[number])], increments) for x in sequences])
-            return CorrelatedRegression.fitted_with_error(y, theta, monomials, groups, ridge, SHRINKAGES)
+        points = np.stack([_points_of_fractions(sequence) for sequence in sequences])
 
-        compared = {increments: [of(number, increments) for number in COMPARED] for increments in (True, False)}
+        def of(
+            numbers: Sequence[int], increments: bool, shrinkages: tuple[float, ...]
+        ) -> list[tuple[CorrelatedRegression, float]]:
+            ys = [described(points[:, number], increments) for number in numbers]
+            return CorrelatedRegression.several_with_errors(ys, theta, monomials, groups, ridge, shrinkages)
+
+        compared = {increments: of(COMPARED, increments, SHRINKAGES) for increments in (True, False)}
         error = {increments: sum(np.log(one) for _, one in results) for increments, results in compared.items()}
         increments = not error[False] < error[True]
-        known = dict(zip(COMPARED, compared[increments], strict=True))
-        regressions = [(known.get(number) or of(number, increments))[0] for number in range(len(FRACTIONS))]
+        known = dict(zip(COMPARED, (one for one, _ in compared[increments]), strict=True))
+        near = np.abs(np.subtract.outer(np.arange(len(FRACTIONS)), COMPARED)).argmin(axis=1)
+        for number, chosen in list(known.items()):
+            others = [one for one in np.flatnonzero(np.take(COMPARED, near) == number).tolist() if one not in known]
+            known |= dict(zip(others, (one for one, _ in of(others, increments, (chosen.shrinkage,))), strict=True))
+        regressions = [known[number] for number in range(len(FRACTIONS))]
         lengths = np.log([len(sequence) for sequence in sequences])
         outside = LEAST_DURATION_MARGIN + float(lengths.std())
         return cls(tuple(regressions), increments, (float(lengths.min()) - outside, float(lengths.max()) + outside))
 
     def adapted(self, sequences: Sequence[Floats], theta: Floats, adaptation: Adaptation) -> Beginnings:
         """Of the person whose movements at theta (K, P) these are."""
-
-        def of(regression: CorrelatedRegression, fraction: float) -> CorrelatedRegression:
-            y = np.stack([points_of(x[: _n_frames(len(x), fraction)], self.increments) for x in sequences])
-            return regression.adapted(y, theta, adaptation)
-
-        return replace(self, regressions=tuple(map(of, self.regressions, FRACTIONS)))
+        points = np.stack([_points_of_fractions(sequence) for sequence in sequences])
+        ys = [described(points[:, number], self.increments) for number in range(len(FRACTIONS))]
+        own = (one.adapted(y, theta, adaptation) for one, y in zip(self.regressions, ys, strict=True))
+        return replace(self, regressions=tuple(own))
 
     def examined(self, sequence: Floats, margin: float, noise: AddedNoise | None = None) -> ExaminedBeginning:
         """A beginning (T, D), with noise beyond that of the training; `margin` as `CorrelatedRegression.estimate`.
@@ -167,9 +174,20 @@ def check_beginning(n_frames: int, minimum: int) -> None:
 
 def points_of(sequence: ArrayLike, increments: bool) -> Floats:
     """Six points of a beginning at equal times, or the first and the increments between them. Shape (6 D,)."""
-    points = resample(np.asarray(sequence, dtype=np.float64), POINTS)
-    return (np.concatenate([points[:1], np.diff(points, axis=0)]) if increments else points).ravel()
+    result: Floats = described(resample(np.asarray(sequence, dtype=np.float64), POINTS)[None], increments)[0]
+    return result
 
 
-def _n_frames(length: int, fraction: float) -> int:
-    return max(FIRST_FRAMES, round(fraction * length))
+def described(points: Floats, increments: bool) -> Floats:
+    """Points (K, 6, D), or the first and the increments between them. Shape (K, 6 D)."""
+    first = points[:, :1]
+    chosen: Floats = np.concatenate([first, np.diff(points, axis=1)], axis=1) if increments else points
+    return chosen.reshape(len(points), -1)
+
+
+def _points_of_fractions(sequence: Floats) -> Floats:
+    """Six points of the beginning of each of `FRACTIONS`, as `resample` of it. Shape (20, 6, D)."""
+    last = np.maximum(FIRST_FRAMES, np.round(np.multiply(FRACTIONS, len(sequence)))) - 1.0
+    positions = np.minimum(last, len(sequence) - 1)[:, None] * np.linspace(0.0, 1.0, POINTS)
+    result: Floats = interpolate(sequence, positions.ravel()).reshape(*positions.shape, -1)
+    return result

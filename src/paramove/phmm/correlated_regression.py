@@ -12,7 +12,7 @@ of the correlations, and the inflation of regions of theta that gives them their
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -88,48 +88,53 @@ class CorrelatedRegression:
         shrinkages: tuple[float, ...] = SHRINKAGES,
     ) -> tuple[CorrelatedRegression, float]:
         """And the mean error of scaled theta of left-out groups, infinite if no group could be left out."""
+        return cls.several_with_errors([y], theta, monomials, groups, ridge, shrinkages)[0]
+
+    @classmethod
+    def several_with_errors(
+        cls,
+        ys: Sequence[Floats],
+        theta: Floats,
+        monomials: Monomials,
+        groups: Ints,
+        ridge: tuple[float, ...] | None = None,
+        shrinkages: tuple[float, ...] = SHRINKAGES,
+    ) -> list[tuple[CorrelatedRegression, float]]:
+        """Of several descriptions (K, n) of the same movements; what depends on theta alone is computed once."""
         features, one_each = monomials.at(theta), one_theta_each(theta, groups)
         # Single movements are left out where a theta that was left out could not be predicted.
         few = one_each and len(np.unique(groups)) <= len(monomials) + 1
         units = np.arange(len(theta)) if few else groups
-        ridge = ridge if ridge is not None else chosen_ridge(y, features, monomials.degrees, units)
+        chosen = ridge if ridge is not None else chosen_ridge(ys[0], features, monomials.degrees, units)
 
-        def of(own: Ints) -> _Fit:
-            return _Fit.of(y[own], features[own], monomials, ridge, groups[own], one_each)
+        def fits(own: Ints) -> list[_Fit]:
+            parts = [y[own] for y in ys]
+            return _Fit.of_several(parts, features[own], monomials, chosen, groups[own], one_each)
 
-        folds = [(tested, of(others)) for tested, others in folds_of(units)]
-        shrinkage = _chosen_shrinkage(folds, y, theta, shrinkages)
-        everything = of(np.arange(len(y)))
-        regression = everything.regression(groups, ridge, shrinkage)
+        def folds(groups: Ints) -> list[list[tuple[Ints, _Fit]]]:
+            """For each description, tested movements and fit of the others."""
+            left = [(tested, fits(others)) for tested, others in folds_of(groups, 3 if one_each else 2)]
+            return [[(tested, of_others[number]) for tested, of_others in left] for number in range(len(ys))]
 
-        def left_out(folds: Iterable[tuple[Ints, _Fit]]) -> Floats:
-            """Error of scaled theta, the same squared in predicted deviations, and distance, of each. (3, K)."""
-            results = np.full((3, len(y)), np.nan)
-            for tested, fit in folds:
-                other = fit.regression(groups[tested], ridge, shrinkage)
-                found, covariances = other.estimates(y[tested], MARGIN)
-                missed = found - theta[tested]
-                results[0, tested] = np.linalg.norm(missed / monomials.scale, axis=1)
-                results[1, tested] = (missed * np.linalg.solve(covariances, missed[..., None])[..., 0]).sum(axis=1)
-                results[2, tested] = other.distances_from(y[tested], found)
-            return results
-
-        results = left_out(folds)
-        tests = [results[1]]
-        error = float(np.nanmean(results[0])) if folds and not few else np.inf
-        if one_each and not few:
-            # Whole groups test extrapolation; how movements of one theta vary is tested by leaving out single ones.
-            shuffled = np.random.default_rng(0).permutation(len(y))
-            results = left_out((tested, of(others)) for tested, others in folds_of(shuffled))
-            tests.append(results[1])
-        distances = results[2]
+        # Whole groups test extrapolation; how movements of one theta vary is tested by leaving out single ones.
+        singles = np.random.default_rng(0).permutation(len(theta)) if one_each and not few else None
+        ways = [folds(units), *([folds(singles)] if singles is not None else [])]
         n_persons = None if one_each else len(np.unique(groups))
-        inflation = inflation_of([one[np.isfinite(one)] for one in tests], theta.shape[1], n_persons)
-        # Movements that no fold tested are compared with a covariance that includes them.
-        untested = np.isnan(distances)
-        if untested.any():
-            distances[untested] = regression.distances_from(y[untested], theta[untested])
-        return replace(regression, inflation=inflation, distances=distances), error
+        results = []
+        for number, (y, everything) in enumerate(zip(ys, fits(np.arange(len(theta))), strict=True)):
+            own = [way[number] for way in ways]
+            shrinkage = _chosen_shrinkage(own[0], y, theta, shrinkages)
+            regression = everything.regression(groups, chosen, shrinkage)
+            tests = [_left_out(one, y, theta, groups, (chosen, shrinkage)) for one in own]
+            errors, distances = tests[0][0], tests[-1][2]
+            inflation = inflation_of([one[1][np.isfinite(one[1])] for one in tests], theta.shape[1], n_persons)
+            # Movements that no fold tested are compared with a covariance that includes them.
+            untested = np.isnan(distances)
+            if untested.any():
+                distances[untested] = regression.distances_from(y[untested], theta[untested])
+            error = float(np.nanmean(errors)) if own[0] and not few else np.inf
+            results.append((replace(regression, inflation=inflation, distances=distances), error))
+        return results
 
     def estimate(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
         """Most likely theta (P,) and its widened covariance (P, P).
@@ -301,28 +306,34 @@ class CondensedRegressions:
 
 @dataclass(frozen=True)
 class _Fit:
-    """Coefficients of some of the movements, before anything is chosen; residuals are rescaled, (K, n)."""
+    """Coefficients of some of the movements, before anything is chosen, and second moments of rescaled residuals."""
 
     monomials: Monomials
     coefficients: Floats
     uncertainty: Floats
     unseen: Floats
-    residuals: Floats
+    moments: Floats
 
     @classmethod
-    def of(
-        cls, y: Floats, features: Floats, monomials: Monomials, ridge: tuple[float, ...], groups: Ints, one_each: bool
-    ) -> _Fit:
-        """`one_each`: groups are those of one theta, not of one person, whose movements have more in common."""
-        penalty = penalties(ridge, monomials.degrees, len(y))
+    def of_several(
+        cls, ys: Sequence[Floats], features: Floats, monomials: Monomials, ridge: tuple[float, ...], groups: Ints,
+        one_each: bool,
+    ) -> list[_Fit]:  # fmt: skip
+        """One of each description; `one_each`: groups are those of one theta, not of one person, who has habits."""
+        penalty = penalties(ridge, monomials.degrees, len(features))
         uncertainty = np.linalg.inv(features.T @ features + penalty).astype(np.float64)
-        coefficients = np.ascontiguousarray((uncertainty @ (features.T @ y)).T)  # as after reading a file
-        rescaled = studentised_residuals if one_each else residuals_left_out
-        unseen = unseen_curvature(features, monomials.degrees)
-        return cls(monomials, coefficients, uncertainty, unseen, rescaled(y, features, penalty, groups))
+        unseen, gain = unseen_curvature(features, monomials.degrees), uncertainty @ features.T
+        rescaled = (studentised_residuals if one_each else residuals_left_out)(
+            np.concatenate(ys, axis=1), features, penalty, groups
+        )
+        borders = np.cumsum([y.shape[1] for y in ys])[:-1]
+        return [
+            cls(monomials, np.ascontiguousarray((gain @ y).T), uncertainty, unseen, part.T @ part / len(part))
+            for y, part in zip(ys, np.split(rescaled, borders, axis=1), strict=True)
+        ]
 
     def root(self, shrinkage: float) -> Floats:
-        return np.linalg.cholesky(shrunk(self.residuals, shrinkage)).astype(np.float64)
+        return np.linalg.cholesky(shrunk(self.moments, shrinkage)).astype(np.float64)
 
     def regression(self, groups: Ints, ridge: tuple[float, ...], shrinkage: float) -> CorrelatedRegression:
         """Not calibrated yet."""
@@ -330,6 +341,22 @@ class _Fit:
             self.monomials, self.coefficients, self.uncertainty, self.unseen, self.root(shrinkage), 1.0,
             np.zeros(len(groups)), groups, ridge, shrinkage,
         )  # fmt: skip
+
+
+def _left_out(
+    folds: Sequence[tuple[Ints, _Fit]], y: Floats, theta: Floats, groups: Ints,
+    chosen: tuple[tuple[float, ...], float],
+) -> Floats:  # fmt: skip
+    """Error of scaled theta, the same squared in predicted deviations, and distance, of each movement. (3, K)."""
+    results = np.full((3, len(y)), np.nan)
+    for tested, fit in folds:
+        other = fit.regression(groups[tested], *chosen)
+        found, covariances = other.estimates(y[tested], MARGIN)
+        missed = found - theta[tested]
+        results[0, tested] = np.linalg.norm(missed / other.monomials.scale, axis=1)
+        results[1, tested] = (missed * np.linalg.solve(covariances, missed[..., None])[..., 0]).sum(axis=1)
+        results[2, tested] = other.distances_from(y[tested], found)
+    return results
 
 
 def _chosen_shrinkage(folds: list[tuple[Ints, _Fit]], y: Floats, theta: Floats, candidates: tuple[float, ...]) -> float:
@@ -351,7 +378,7 @@ def _linearised(fit: _Fit, root: Floats, y: Floats, theta: Floats) -> Floats:
     """Squared error of theta in predicted deviations and log-volume of its region, of each movement. Shape (2, k)."""
     own, (count, dimension) = fit.monomials, theta.shape
     phi = own.at(theta)
-    slopes = np.stack([fit.coefficients @ own.jacobian(one) * own.scale for one in theta], axis=1)  # (n, k, P)
+    slopes = np.einsum("nf,kfp->nkp", fit.coefficients, own.jacobian(theta) * own.scale, optimize=True)
     wide = np.concatenate([slopes, (y - phi @ fit.coefficients.T).T[:, :, None]], axis=2).reshape(len(root), -1)
     white = solve_triangular(root, wide, lower=True, check_finite=False).reshape(-1, count, dimension + 1)
     slopes, missed = white[..., :-1], white[..., -1]
@@ -381,9 +408,8 @@ def unseen_curvature(features: Floats, degrees: Ints) -> Floats:
     return np.linalg.inv(known + precision).astype(np.float64)
 
 
-def shrunk(residuals: Floats, shrinkage: float) -> Floats:
-    """Second moments of residuals (K, n), correlations shrunk. Shape (n, n)."""
-    moments = residuals.T @ residuals / len(residuals)
+def shrunk(moments: Floats, shrinkage: float) -> Floats:
+    """Second moments (n, n) with shrunk correlations. Shape (n, n)."""
     variances = np.maximum(np.diagonal(moments), 1e-12)
     result: Floats = (1.0 - shrinkage) * moments
     result.flat[:: len(moments) + 1] += shrinkage * variances + 1e-6 * variances.mean()

@@ -92,11 +92,10 @@ class Monomials:
         return np.concatenate([result, expit(u @ self.units[:, :-1].T + self.units[:, -1])], axis=-1)
 
     def jacobian(self, theta: ArrayLike) -> Floats:
-        """Derivatives with respect to theta (P,). Shape (F + H, P)."""
+        """Derivatives with respect to theta (P,) or many (K, P). Shape (F + H, P) or (K, F + H, P)."""
         u = (np.asarray(theta, dtype=np.float64) - self.centre) / self.scale
-        values, slopes = np.empty(len(self)), np.empty((len(self), len(u)))
-        features_at(u, self.exponents, self.logistic, values, slopes)
-        result: Floats = slopes / self.scale
+        slopes = slopes_at(np.atleast_2d(u), self.exponents, self.logistic) / self.scale
+        result: Floats = slopes[0] if u.ndim == 1 else slopes
         return result
 
     def n_distinct(self, theta: Floats) -> int:
@@ -136,3 +135,13 @@ def features_at(u: Floats, exponents: Ints, units: Floats, values: Floats, slope
         values[n_monomials + h] = value
         for p in range(n_components):
             slopes[n_monomials + h, p] = value * (1.0 - value) * units[h, p]
+
+
+@compiled
+def slopes_at(rows: Floats, exponents: Ints, units: Floats) -> Floats:
+    """Derivatives of all features at u (K, P). Shape (K, F + H, P)."""
+    n_features = len(exponents) + len(units)
+    values, slopes = np.empty(n_features), np.empty((len(rows), n_features, rows.shape[1]))
+    for k in range(len(rows)):
+        features_at(rows[k], exponents, units, values, slopes[k])
+    return slopes

@@ -10,19 +10,19 @@ from paramove.documents import Floats, Ints
 MAX_FOLDS = 10
 
 
-def fold_numbers(groups: Ints) -> Ints:
+def fold_numbers(groups: Ints, least: int = 3) -> Ints:
     """Number below `MAX_FOLDS` of each movement's fold, from its group (K,); groups stay together. Shape (K,).
 
-    For one or two groups, parts of their movements.
+    For fewer than `least` groups, parts of their movements.
     """
     different = np.unique(groups)
-    numbers = np.searchsorted(different, groups) if len(different) > 2 else np.arange(len(groups))
+    numbers = np.searchsorted(different, groups) if len(different) >= least else np.arange(len(groups))
     return np.asarray(numbers % MAX_FOLDS, dtype=np.int64)
 
 
-def folds_of(groups: Ints) -> Iterator[tuple[Ints, Ints]]:
+def folds_of(groups: Ints, least: int = 3) -> Iterator[tuple[Ints, Ints]]:
     """Tested movements and the others, for each fold of `fold_numbers` that leaves at least two others."""
-    numbers = fold_numbers(groups)
+    numbers = fold_numbers(groups, least)
     for fold in np.unique(numbers):
         tested, others = np.flatnonzero(numbers == fold), np.flatnonzero(numbers != fold)
         if len(others) > 1:
@@ -45,9 +45,10 @@ def inflation_of(tests: Sequence[Floats], dimension: int, n_persons: int | None)
         tests: squared errors of left-out movements in predicted deviations, (K,), of one or several ways to leave out;
             the largest factor counts. None or empty if nothing could be left out.
         dimension: P.
-        n_persons: how many persons the errors are from: few determine tails badly. None: errors are independent.
+        n_persons: how many persons the errors are from: few determine tails badly. Of two, each was predicted from one
+            alone, whose habits are errors too: that is wide enough. None: errors are independent.
     """
-    few = 1.0 if n_persons is None else (n_persons + dimension) / max(1, n_persons - 1)
+    few = 1.0 if n_persons is None or n_persons == 2 else (n_persons + dimension) / max(1, n_persons - 1)
     factors = []
     for excess in tests:
         if len(excess):
