@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from typing import Literal, NamedTuple, Self, TypeGuard, get_args
 
@@ -11,14 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.documents import Floats, renamed_attribute
-from paramove.hmm import check_length, checked_sequence, checked_sequences
+from paramove.hmm import check_length, checked_sequence, checked_sequences, interpolate
 from paramove.phmm.adaptation import Adaptation
+from paramove.phmm.conditioning import Condition, deviation
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData, checked_theta
 from paramove.phmm.performance import Performances, movement_parts, state_averages
 
 Residuals = Literal["independent", "correlated"]
+INDEPENDENT = "this model has independent residuals: train it with residuals='correlated'"
+FOLLOWED, LEAST_CORRELATED = 0.9, 0.1
+"""Fraction of the correlations of executions that conditions follow, and which fraction of them is known at least."""
+START = 0.05
+"""Conditions up to this fraction of a movement are conditions on its start."""
 
 
 class Examination(NamedTuple):
@@ -110,7 +116,7 @@ class ExaminingPHMM(ParametricHMM):
 
     def _examined(self, recorded: Floats, finished: bool) -> Examination:
         if self.performances_ is None:
-            raise ValueError("this model has independent residuals: train it with residuals='correlated'")
+            raise ValueError(INDEPENDENT)
         if not finished:
             found = self.performances_.examined_beginning(recorded, self.search_margin)
             estimate = ParameterEstimate(found.theta, found.covariance, found.log_density)
@@ -128,6 +134,69 @@ class ExaminingPHMM(ParametricHMM):
         parts = movement_parts(recorded)
         theta, covariance = performances.estimate(parts, self.search_margin)
         return ParameterEstimate(theta, covariance, self._log_likelihood_at(checked, theta)), parts
+
+    def synthesize_through(self, theta: ArrayLike, via: Mapping[float, ArrayLike], n_samples: int) -> Floats:
+        """The most likely movement for theta (P,) that passes given poses. Shape (n_samples, D).
+
+        It deviates from `synthesize` as whole executions do: along the model's covariance, smooth to the acceleration.
+
+        Args:
+            theta: (P,).
+            via: poses (D,) by the fraction of the movement at which they are passed, 0 to 1; NaN leaves a coordinate
+                free. More than about five are met approximately. Without one at the start it starts as usual.
+            n_samples: of the movement.
+
+        Raises ValueError for poses and fractions that do not fit, and for independent residuals, which know no
+        executions.
+        """
+        mean, covariance = self.synthesize(theta, n_samples), self._covariance_of_executions()
+        conditions = []
+        for progress, pose in via.items():
+            wanted = np.asarray(pose, dtype=np.float64)
+            if wanted.shape != mean.shape[1:] or np.isinf(wanted).any() or not 0.0 <= progress <= 1.0:
+                raise ValueError(
+                    f"via has poses of {mean.shape[1]} numbers by fractions from 0 to 1, found shape {wanted.shape} at "
+                    f"{progress}"
+                )
+            conditions.append(
+                Condition(progress, wanted - interpolate(mean, np.array([progress * (n_samples - 1)]))[0])
+            )
+        if not conditions:
+            return mean
+        if min(via) > START:
+            conditions.append(Condition(0.0, np.zeros(mean.shape[1])))
+        return mean + deviation(conditions, covariance, n_samples)
+
+    def redirect(self, movement: ArrayLike, theta: ArrayLike, at: float, within: float = 0.3) -> Floats:
+        """A movement (n, D) that from a fraction `at` of it on turns to another theta (P,). Shape (n, D).
+
+        Within a further fraction, at most what is left, it becomes the movement of the new theta, by a minimum-jerk
+        transition: continuous to the acceleration, and never outside both.
+
+        Raises ValueError for fractions that do not fit.
+        """
+        made = checked_sequence(movement, self._dimension())
+        if not 0.0 <= at < 1.0 or not within > 0.0:
+            raise ValueError(f"expected 0 <= at < 1 and within > 0, found {at} and {within}")
+        progress = np.clip((np.linspace(0.0, 1.0, len(made)) - at) / min(within, 1.0 - at), 0.0, 1.0)[:, None]
+        turned = progress**3 * (10.0 - 15.0 * progress + 6.0 * progress**2)
+        result: Floats = made + turned * (self.synthesize(theta, len(made)) - made)
+        return result
+
+    def _dimension(self) -> int:
+        self._check_trained()
+        return int(self.covariances_.shape[-1])
+
+    def _covariance_of_executions(self) -> Floats:
+        self._check_trained()
+        if self.performances_ is None:
+            raise ValueError(INDEPENDENT)
+        regression = self.performances_.complete
+        covariance, shrinkage = regression.root @ regression.root.T, min(regression.shrinkage, 1.0 - LEAST_CORRELATED)
+        diagonal = np.diag(np.diagonal(covariance))
+        # What tells outliers takes half of the correlations for chance; what is made follows nearly all of them.
+        result: Floats = diagonal + FOLLOWED / (1.0 - shrinkage) * (covariance - diagonal)
+        return result
 
     def adapt(self, sequences: Sequence[ArrayLike], theta: ArrayLike | None = None) -> Self:
         """This model of other persons, adapted to a person of whom there are a few movements: about three suffice.

@@ -1,0 +1,61 @@
+"""Synthesis under conditions: poses that a movement passes.
+
+Whole executions of one theta deviate from their mean with the covariance C of `movement_parts`. Between the middles of
+the parts and the last frame, deviations follow a cubic spline, which is continuous to the acceleration; so a movement
+is Gaussian in its whole course, and conditions on poses are linear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from paramove.documents import Floats
+from paramove.phmm.performance import PARTS
+
+TIMES = (*((np.arange(PARTS) + 0.5) / PARTS).tolist(), 1.0)
+"""Fractions of a movement at which deviations are known: middles of the parts, and the end."""
+EXACT = 1e-9
+"""Variance of a condition, relative to that of the movement there."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A pose at one time.
+
+    Attributes:
+        progress: fraction of the movement, 0 to 1. missed: what the mean movement lacks there, (D,); NaN: anything.
+    """
+
+    progress: float
+    missed: Floats
+
+
+def deviation(conditions: list[Condition], covariance: Floats, n_samples: int) -> Floats:
+    """The most likely deviation from the mean movement under all conditions. Shape (n_samples, D).
+
+    Args:
+        conditions: as many as the six times of `movement_parts` can meet; others are met as well as possible.
+        covariance: of `movement_parts`, (6 D, 6 D). n_samples: of the movement.
+    """
+    dimension = len(covariance) // len(TIMES)
+    rows = np.kron(_splines()([one.progress for one in conditions]), np.eye(dimension))
+    missed = np.concatenate([one.missed for one in conditions])
+    known = np.isfinite(missed)
+    rows, missed = rows[known], missed[known]
+    crossed = covariance @ rows.T
+    own = rows @ crossed
+    weights = np.linalg.solve(own + EXACT * np.diag(np.diagonal(own)), missed)
+    moved = (crossed @ weights).reshape(len(TIMES), dimension)
+    result: Floats = _splines()(np.linspace(0.0, 1.0, n_samples)) @ moved
+    return result
+
+
+@lru_cache(maxsize=1)
+def _splines() -> Any:
+    from scipy.interpolate import CubicSpline  # half a second, which only those who need it should wait
+
+    return CubicSpline(TIMES, np.eye(len(TIMES)))
