@@ -88,7 +88,7 @@ def test_covariance_of_averages_is_that_of_drawn_noise(n_frames: int | None) -> 
 
     drawn = 0.5 * rng.standard_normal((4000, 60, 2))
     seen = drawn if n_frames is None else np.stack([resample(one, n_frames) for one in drawn])
-    found = np.cov(np.stack([movement_parts(one) for one in seen]).T)
+    found = np.cov(np.stack([movement_parts(one) for one in drawn]).T)
     expected = noise.of_averages(movement_parts)
     assert_allclose(found, expected, rtol=0.0, atol=0.08 * np.diagonal(expected).max())
     assert_allclose(np.diagonal(found), np.diagonal(expected), rtol=0.12)

@@ -2,14 +2,14 @@ from .classification import INDEX_FILE as INDEX_FILE
 from .classification import Classification as Classification
 from .classification import MovementClassifier as MovementClassifier
 from .description import MovementDescription as MovementDescription
-from .examining import Examination as Examination
+from .estimates import Examination as Examination
+from .estimates import ParameterEstimate as ParameterEstimate
 from .examining import has_p_values as has_p_values
 from .grid import ParameterGrid as ParameterGrid
 from .interpolative import InterpolativePHMM as InterpolativePHMM
 from .model_cache import cached_model as cached_model
 from .model_cache import stored_model as stored_model
 from .network.model import NeuralPHMM as NeuralPHMM
-from .parametric import ParameterEstimate as ParameterEstimate
 from .parametric import ParametricHMM as ParametricHMM
 from .performance import groups_of as groups_of
 from .plausibility import UnlikelyMovementWarning as UnlikelyMovementWarning

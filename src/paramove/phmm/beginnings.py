@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +20,7 @@ from paramove.documents import Floats, Ints
 from paramove.hmm import interpolate, resample
 from paramove.phmm.adaptation import Adaptation
 from paramove.phmm.correlated_regression import CondensedRegressions, CorrelatedRegression
+from paramove.phmm.estimates import Examination, ParameterEstimate
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise
 
@@ -37,16 +37,6 @@ LEAST_DURATION_MARGIN = 0.005
 WIDEST_MARGIN, PRIOR_WIDTH = 0.25, 1.5
 """Theta is searched this far outside the bounds of the training; its prior has a deviation of 1.5 times half their
 distance."""
-
-
-class ExaminedBeginning(NamedTuple):
-    """Theta (P,), its covariance (P, P); of the likeliest fraction the density, outlier score and log p-value."""
-
-    theta: Floats
-    covariance: Floats
-    log_density: float
-    outlier_score: float
-    log_p_value: float
 
 
 @dataclass(frozen=True)
@@ -102,7 +92,7 @@ class Beginnings:
         own = (one.adapted(y, theta, adaptation) for one, y in zip(self.regressions, ys, strict=True))
         return replace(self, regressions=tuple(own))
 
-    def examined(self, sequence: Floats, margin: float, noise: AddedNoise | None = None) -> ExaminedBeginning:
+    def examined(self, sequence: Floats, margin: float, noise: AddedNoise | None = None) -> Examination:
         """A beginning (T, D), with noise beyond that of the training; `margin` as `CorrelatedRegression.estimate`.
 
         Raises ValueError for a beginning of fewer than 5 frames.
@@ -135,10 +125,9 @@ class Beginnings:
         covariance = np.einsum("k,kpq->pq", weights, covariances) + (weights * missed.T) @ missed
         best = int(weights.argmax())
         usual = float(np.median(regressions[best].distances)) + 1e-9
-        return ExaminedBeginning(
-            mean, covariance, float(densities[best]), float(np.sqrt(distances[best] / usual)),
-            regressions[best].log_p_value(float(distances[best])),
-        )  # fmt: skip
+        density, outlier_score = float(densities[best]), float(np.sqrt(distances[best] / usual))
+        p_value = regressions[best].log_p_value(float(distances[best]))
+        return Examination(ParameterEstimate(mean, covariance, density), outlier_score, density, p_value)
 
     @cached_property
     def _condensed(self) -> CondensedRegressions:

@@ -14,8 +14,9 @@ from scipy.special import logsumexp
 from paramove.documents import Floats, renamed_attribute
 from paramove.hmm import checked_sequence, checked_sequences, not_fitted
 from paramove.phmm.discriminant import Discriminant, discriminant_for, discriminants
+from paramove.phmm.estimates import ParameterEstimate
 from paramove.phmm.examining import ExaminingPHMM, has_p_values
-from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
+from paramove.phmm.parametric import ParametricHMM
 from paramove.phmm.performance import groups_of
 from paramove.phmm.polynomial import QuadraticPHMM
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record

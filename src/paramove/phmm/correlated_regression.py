@@ -75,20 +75,7 @@ class CorrelatedRegression:
         shrinkages: tuple[float, ...] = SHRINKAGES,
     ) -> CorrelatedRegression:
         """From movements (K, n), labels (K, P) and the number of the group of each (K,); a ridge may be given."""
-        return cls.fitted_with_error(y, theta, monomials, groups, ridge, shrinkages)[0]
-
-    @classmethod
-    def fitted_with_error(
-        cls,
-        y: Floats,
-        theta: Floats,
-        monomials: Monomials,
-        groups: Ints,
-        ridge: tuple[float, ...] | None = None,
-        shrinkages: tuple[float, ...] = SHRINKAGES,
-    ) -> tuple[CorrelatedRegression, float]:
-        """And the mean error of scaled theta of left-out groups, infinite if no group could be left out."""
-        return cls.several_with_errors([y], theta, monomials, groups, ridge, shrinkages)[0]
+        return cls.several_with_errors([y], theta, monomials, groups, ridge, shrinkages)[0][0]
 
     @classmethod
     def several_with_errors(
@@ -100,7 +87,10 @@ class CorrelatedRegression:
         ridge: tuple[float, ...] | None = None,
         shrinkages: tuple[float, ...] = SHRINKAGES,
     ) -> list[tuple[CorrelatedRegression, float]]:
-        """Of several descriptions (K, n) of the same movements; what depends on theta alone is computed once."""
+        """Of several descriptions (K, n) of the same movements; what depends on theta alone is computed once.
+
+        And for each the mean error of scaled theta of left-out groups, infinite if no group could be left out.
+        """
         features, one_each = monomials.at(theta), one_theta_each(theta, groups)
         # Single movements are left out where a theta that was left out could not be predicted.
         few = one_each and len(np.unique(groups)) <= len(monomials) + 1

@@ -5,18 +5,19 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import Literal, NamedTuple, Self, TypeGuard, get_args
+from typing import Literal, Self, TypeGuard, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents import Floats, renamed_attribute
+from paramove.documents import Floats
 from paramove.hmm import check_length, checked_sequence, checked_sequences, interpolate
 from paramove.phmm.adaptation import Adaptation
 from paramove.phmm.conditioning import Condition, deviation
+from paramove.phmm.estimates import Examination, ParameterEstimate
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise
-from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData, checked_theta
+from paramove.phmm.parametric import ParametricHMM, TrainingData, checked_theta
 from paramove.phmm.performance import Performances, movement_parts, state_averages
 
 Residuals = Literal["independent", "correlated"]
@@ -25,32 +26,6 @@ FOLLOWED, LEAST_CORRELATED = 0.9, 0.1
 """Fraction of the correlations of executions that conditions follow, and which fraction of them is known at least."""
 START = 0.05
 """Conditions up to this fraction of a movement are conditions on its start."""
-
-
-class Examination(NamedTuple):
-    """A sequence examined by one model.
-
-    Attributes:
-        estimate: of theta.
-        outlier_score: distance from the training movements, see `Performances.outlier_score`; of a beginning the
-            root of its distance in units of the median one.
-        log_density: of `movement_parts`, or of the points of a beginning.
-        log_p_value: logarithm of `p_value`.
-    """
-
-    estimate: ParameterEstimate
-    outlier_score: float
-    log_density: float
-    log_p_value: float
-
-    @property
-    def p_value(self) -> float:
-        """Probability that a genuine movement has at least this outlier score; a small one is a reason to reject."""
-        return float(np.exp(self.log_p_value))
-
-
-for _old, _new in (("strangeness", "outlier_score"), ("typicality", "p_value"), ("log_typicality", "log_p_value")):
-    setattr(Examination, _old, renamed_attribute(_old, _new))
 
 
 def has_p_values(model: ParametricHMM) -> TypeGuard[ExaminingPHMM]:
@@ -118,9 +93,7 @@ class ExaminingPHMM(ParametricHMM):
         if self.performances_ is None:
             raise ValueError(INDEPENDENT)
         if not finished:
-            found = self.performances_.examined_beginning(recorded, self.search_margin)
-            estimate = ParameterEstimate(found.theta, found.covariance, found.log_density)
-            return Examination(estimate, found.outlier_score, found.log_density, found.log_p_value)
+            return self.performances_.examined_beginning(recorded, self.search_margin)
         estimate, parts = self._estimated(recorded, self.performances_)
         nearest = self.performances_.complete.estimate(parts, self.search_margin)[0]
         distance = self.performances_.complete.distance(parts, nearest)

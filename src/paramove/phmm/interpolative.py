@@ -12,12 +12,13 @@ from paramove.documents import Floats
 from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
 from paramove.phmm import interpolation_kernels, interpolation_search
 from paramove.phmm.description import MovementDescription
+from paramove.phmm.estimates import ParameterEstimate
 from paramove.phmm.examining import ExaminingPHMM, Residuals, inverse_information
 from paramove.phmm.features import Monomials
 from paramove.phmm.grid import ParameterGrid
 from paramove.phmm.local_models import check_local_models
 from paramove.phmm.noise import AddedNoise
-from paramove.phmm.parametric import ParameterEstimate, TrainingData
+from paramove.phmm.parametric import TrainingData
 from paramove.phmm.synchronisation import synchronised
 
 REMEDY = "demonstrate every point of a grid, or train a QuadraticPHMM, which needs none"

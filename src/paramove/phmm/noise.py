@@ -100,20 +100,10 @@ class AddedNoise:
     n_frames: int | None = None
 
     @property
-    def n_model_frames(self) -> int:
-        """Number of frames of the model's input."""
-        return len(self.sequence) if self.n_frames is None else self.n_frames
-
-    @property
-    def weights(self) -> Floats:
-        """Weights of the recorded frames in those of the model's input, shape (n_frames, T)."""
-        everything = np.eye(len(self.sequence))
-        return resample(everything, self.n_model_frames)
-
-    @property
     def of_frames(self) -> float:
         """Variance of each coordinate of the frames of the model's input, on average."""
-        return self.variance * float((self.weights**2).sum(axis=1).mean())
+        weights = resample(np.eye(len(self.sequence)), self.n_frames or len(self.sequence))
+        return self.variance * float((weights**2).sum(axis=1).mean())
 
     @property
     def of_states(self) -> Floats:
@@ -121,11 +111,11 @@ class AddedNoise:
         return self.of_frames * np.eye(self.sequence.shape[1])
 
     def of_averages(self, averaged: Callable[[Floats], Floats]) -> Floats:
-        """Covariance (m D, m D) of m averages of frames, one after the other, of all coordinates.
+        """Covariance (m D, m D) of m averages of recorded frames, one after the other, of all coordinates.
 
         `averaged` maps a sequence with any number D of coordinates linearly to m D numbers, each coordinate alike.
         """
-        weights = averaged(self.weights).reshape(-1, len(self.sequence))
+        weights = averaged(np.eye(len(self.sequence))).reshape(-1, len(self.sequence))
         of_one = self.variance * (weights @ weights.T)
         return np.kron(of_one, np.eye(self.sequence.shape[1])).astype(np.float64)
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import ceil
 from numbers import Integral
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,6 +34,7 @@ from paramove.hmm import (
 )
 from paramove.hmm import Path as PathKind
 from paramove.phmm.description import MovementDescription
+from paramove.phmm.estimates import ParameterEstimate
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, NoiseLevel
 from paramove.phmm.performance import groups_of
@@ -43,14 +44,6 @@ from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, writ
 
 MAX_FRAMES = 100_000
 DEFAULT_FRAMES, STATE_MARGIN = 100, 0.2
-
-
-class ParameterEstimate(NamedTuple):
-    """Maximum likelihood theta (P,), its covariance (P, P) and the log-likelihood there."""
-
-    theta: Floats
-    covariance: Floats
-    log_likelihood: float
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from paramove.documents import Floats, Ints
 from paramove.hmm import resample
 from paramove.phmm.adaptation import Adaptation
-from paramove.phmm.beginnings import Beginnings, ExaminedBeginning
+from paramove.phmm.beginnings import Beginnings
 from paramove.phmm.correlated_regression import CorrelatedRegression
+from paramove.phmm.estimates import Examination
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, distances_with_noise, moving_average
 from paramove.phmm.predictive_distribution import PredictiveDistribution
@@ -101,8 +102,9 @@ class Performances:
         parts = np.stack([movement_parts(sequence) for sequence in sequences])
         last = parts[:, -LATE_ROWS * sequences[0].shape[1] :]
         complete = CorrelatedRegression.fitted(parts, theta, monomials, groups, shrinkages=(OUTLIER_SHRINKAGE,))
-        estimating, error = CorrelatedRegression.fitted_with_error(parts, theta, monomials, groups, complete.ridge)
-        late, late_error = CorrelatedRegression.fitted_with_error(last, theta, monomials, groups)
+        fitted = CorrelatedRegression.several_with_errors
+        ((estimating, error),) = fitted([parts], theta, monomials, groups, complete.ridge)
+        ((late, late_error),) = fitted([last], theta, monomials, groups)
         beginnings = Beginnings.fitted(sequences, theta, monomials, groups, complete.ridge)
         pace = Pace.fitted(sequences, groups)
         return cls(complete, beginnings, pace, late if late_error < error else estimating)
@@ -119,7 +121,7 @@ class Performances:
 
     def expecting(self, noise: AddedNoise) -> Performances:
         """The same for a sequence with noise."""
-        of_parts = replace(noise, n_frames=None).of_averages(movement_parts)
+        of_parts = noise.of_averages(movement_parts)
         pace, n_last = self.pace.expecting(noise.variance, noise.sequence), len(self.estimating.coefficients)
         estimating = self.estimating.widened(of_parts[-n_last:, -n_last:])
         complete = self.complete.widened(of_parts)
@@ -152,9 +154,9 @@ class Performances:
         known = np.log(_outlier_score(distances, paces, distances, paces) + 1e-9)
         return PredictiveDistribution.of(known, self.complete.groups)
 
-    def examined_beginning(self, sequence: Floats, margin: float) -> ExaminedBeginning:
+    def examined_beginning(self, sequence: Floats, margin: float) -> Examination:
         """See `Beginnings.examined`."""
-        return self.beginnings.examined(sequence, margin, self.noise and replace(self.noise, n_frames=None))
+        return self.beginnings.examined(sequence, margin, self.noise)
 
     def arrays(self) -> dict[str, Floats]:
         """Everything learned, for a file."""

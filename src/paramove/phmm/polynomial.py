@@ -19,11 +19,12 @@ from paramove.hmm import (
 )
 from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
+from paramove.phmm.estimates import ParameterEstimate
 from paramove.phmm.examining import ExaminingPHMM, Residuals, inverse_information
 from paramove.phmm.features import Monomials
 from paramove.phmm.local_models import check_local_models
 from paramove.phmm.noise import AddedNoise
-from paramove.phmm.parametric import ParameterEstimate, TrainingData
+from paramove.phmm.parametric import TrainingData
 from paramove.phmm.performance import state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
 from paramove.phmm.ridge import smoothed

@@ -8,13 +8,13 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from scipy.spatial import Delaunay, QhullError
-from scipy.special import chdtri  # scipy.stats would take half a second to import
 
 from paramove.alignment import movement_distance
 from paramove.documents import Floats
 from paramove.hmm import resample
 from paramove.phmm import InterpolativePHMM, ParametricHMM, groups_of
 from paramove.training.examples import Examples, is_place
+from paramove.training.plots import levels_of
 
 LeftOutBy = Literal["theta", "subject", "repetition"]
 
@@ -120,9 +120,7 @@ def leave_out(
 
 def covers(estimated: Floats, covariance: Floats, theta: Floats) -> bool:
     """Whether the 95 % region of an estimate holds theta."""
-    difference = theta - estimated
-    squared = float(difference @ np.linalg.solve(covariance, difference))
-    return 0.0 <= squared <= float(chdtri(len(theta), 1.0 - REGION))
+    return bool(levels_of(theta[None], estimated[None], covariance[None])[0] <= REGION)
 
 
 def _folds(examples: Examples, by: LeftOutBy) -> list[list[int]]:

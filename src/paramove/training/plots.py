@@ -66,7 +66,7 @@ def plot_theta(
     found = [model.estimate(sequence) for sequence in sequences]
     estimated, covariances = np.array([one.theta for one in found]), np.array([one.covariance for one in found])
     labels = None if theta is None else np.asarray(theta, dtype=np.float64).reshape(estimated.shape)
-    held = np.ones(len(found), bool) if labels is None else _levels_of(labels, estimated, covariances) <= 0.95
+    held = np.ones(len(found), bool) if labels is None else levels_of(labels, estimated, covariances) <= 0.95
     for number, (at, covariance) in enumerate(zip(estimated, covariances, strict=True)):
         colour = ACTION_COLOURS[0] if held[number] else WARN
         if estimated.shape[1] == 1:
@@ -104,7 +104,7 @@ def plot_coverage(
     """
     new = ax is None
     axes = ax or _new_axes(4.6, 4.4)
-    levels = _levels_of(*(np.asarray(one, dtype=np.float64) for one in (theta, estimated, covariances)))
+    levels = levels_of(*(np.asarray(one, dtype=np.float64) for one in (theta, estimated, covariances)))
     if new or not axes.lines:
         half = ndtri(0.975) * np.sqrt(LEVELS * (1.0 - LEVELS) / len(levels))
         axes.fill_between(
@@ -121,11 +121,11 @@ def plot_coverage(
 
 def coverage(theta: ArrayLike, estimated: ArrayLike, covariances: ArrayLike, level: float = 0.95) -> float:
     """Fraction of regions of that level that hold theta; arguments as of `plot_coverage`."""
-    levels = _levels_of(*(np.asarray(one, dtype=np.float64) for one in (theta, estimated, covariances)))
+    levels = levels_of(*(np.asarray(one, dtype=np.float64) for one in (theta, estimated, covariances)))
     return float(np.mean(levels <= level))
 
 
-def _levels_of(theta: Floats, estimated: Floats, covariances: Floats) -> Floats:
+def levels_of(theta: Floats, estimated: Floats, covariances: Floats) -> Floats:
     """Level of the smallest region of each estimate that holds theta. Shape (K,)."""
     missed = estimated.reshape(len(estimated), -1) - theta.reshape(len(theta), -1)
     squared = (missed * np.linalg.solve(covariances, missed[..., None])[..., 0]).sum(axis=1)

@@ -81,7 +81,7 @@ def test_slopes_of_the_networks_equal_finite_differences() -> None:
 
 
 @settings(max_examples=5, deadline=None, derandomize=True)
-@given(st.integers(0, 2**31), st.integers(1, 3), st.integers(0, 2))
+@given(st.integers(0, 2**31), st.integers(1, 3), st.integers(1, 2))
 def test_generalised_em_never_lowers_the_objective(seed: int, n_hidden: int, skip_degree: int) -> None:
     rng = np.random.default_rng(seed)
     theta = rng.uniform(0.0, 1.0, (20, 2))
@@ -174,21 +174,9 @@ def test_restarts_are_drawn_from_the_seed() -> None:
     assert not np.array_equal(inner(1), inner(2))
 
 
-def test_a_model_in_which_nothing_depends_on_theta_is_refused() -> None:
-    with pytest.raises(ValueError, match="nothing depends on theta: give n_hidden=None or more"):
-        NeuralPHMM(8, 4, 6, n_hidden=0, skip_degree=0).fit(*shown(0))
-
-
-def test_the_network_alone_has_units() -> None:
-    model = NeuralPHMM(8, 4, 6, skip_degree=0, n_restarts=1, options=TrainingOptions(max_iterations=4)).fit(*shown(0))
-    assert model.n_hidden_ > 0
-    found = model.estimate(wave(np.array([0.3, 0.7]), np.random.default_rng(7)))
-    assert_allclose(found.theta, [0.3, 0.7], rtol=0.0, atol=0.15)  # two units, trained for four iterations only
-
-
-@pytest.mark.parametrize("parameters", [{"n_hidden": -1}, {"skip_degree": -1}, {"gradient_steps": 0}])
+@pytest.mark.parametrize("parameters", [{"n_hidden": -1}, {"skip_degree": 0}, {"gradient_steps": 0}])
 def test_impossible_parameters_are_refused(parameters: dict[str, int]) -> None:
-    with pytest.raises(ValueError, match="not negative, gradient_steps is at least 1"):
+    with pytest.raises(ValueError, match="skip_degree and gradient_steps are at least 1, n_hidden is not negative"):
         NeuralPHMM(8, 4, 6, **parameters).fit(*shown(0))
 
 

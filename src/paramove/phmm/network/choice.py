@@ -31,25 +31,22 @@ class Choice:
     inner: Floats
 
 
-def chosen_units(
-    targets: StateTargets, groups: Ints, units: tuple[int | None, int], n_restarts: int, seed: int
-) -> Choice:
+def chosen_units(targets: StateTargets, groups: Ints, n_hidden: int | None, n_restarts: int, seed: int) -> Choice:
     """The best number of units, or the best start for a given one.
 
     Args:
         targets: with the ridge of the skip's columns only. groups: number of the group of each target, (K,).
-        units: their number, or None and the minimum.
+        n_hidden: number of units if it is given.
     """
-    n_hidden, minimum = units
     targets, groups = _condensed(targets, groups)
     rng = np.random.default_rng(seed)
     n_groups = len(np.unique(groups))
     shape = targets.weights.shape[1], targets.positions.shape[1]
     if n_hidden is None and n_groups < 4:
-        n_hidden = minimum  # the rest may be noise
+        n_hidden = 0  # the rest may be noise
     numbers = NUMBERS_OF_UNITS if n_hidden is None else (n_hidden,)
     best = Choice(0, DECAYS[0], np.zeros((shape[0], 0, shape[1] + 1)))
-    known = _left_out_errors(targets, groups, best) if n_hidden is None and minimum == 0 else None
+    known = _left_out_errors(targets, groups, best) if n_hidden is None else None
     for number in numbers if n_hidden != 0 else ():
         if n_hidden is None and number > 2 * max(1, best.n_hidden):
             break  # half as many did not help
