@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import runpy
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +22,13 @@ def code_of(path: Path) -> list[str]:
     return ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
 
 
-def drawn(path: Path) -> tuple[dict[str, Any], list[np.ndarray]]:
-    """Names and pictures after all cells."""
+def drawn(path: Path, folder: Path) -> tuple[dict[str, Any], list[np.ndarray]]:
+    """Names and pictures after all cells, run as one program."""
     matplotlib.use("agg")
     pyplot.close("all")
-    names: dict[str, Any] = {"__name__": "notebook"}
-    for number, cell in enumerate(code_of(path)):
-        exec(compile(cell, f"{path.name}, cell {number}", "exec"), names)
+    program = folder / f"{path.stem}.py"
+    program.write_text("\n\n".join(code_of(path)))
+    names = runpy.run_path(str(program))
     pictures = []
     for number in pyplot.get_fignums():
         canvas = FigureCanvasAgg(pyplot.figure(number))
@@ -43,15 +44,15 @@ def test_both_notebooks_are_there_without_output() -> None:
         assert all(not cell.get("outputs") for cell in json.loads(path.read_text())["cells"])
 
 
-def test_the_first_model_recognises_and_rejects() -> None:
-    names, pictures = drawn(FOLDER / "your_first_parametric_model.ipynb")
+def test_the_first_model_recognises_and_rejects(tmp_path: Path) -> None:
+    names, pictures = drawn(FOLDER / "your_first_parametric_model.ipynb", tmp_path)
     assert len(pictures) == 2
     assert all((picture < 250).any(axis=2).mean() > 0.02 for picture in pictures)
     assert names["genuine"] > 0.01 > names["other"]
 
 
-def test_the_honest_model_is_honest() -> None:
-    names, pictures = drawn(FOLDER / "is_my_model_honest.ipynb")
+def test_the_honest_model_is_honest(tmp_path: Path) -> None:
+    names, pictures = drawn(FOLDER / "is_my_model_honest.ipynb", tmp_path)
     assert len(pictures) == 3
     assert all((picture < 250).any(axis=2).mean() > 0.02 for picture in pictures)
     assert 85.0 <= np.mean(names["held"][5]) <= 100.0
