@@ -150,7 +150,7 @@ def train_pointing_model(seed: int = 0, *, n_states: int = 80, repetitions: int 
     """The 2 x 2 interpolative model of pointing with parameters (u, v) that the blending starts from (4.3)."""
     targets, theta = table_targets(2, 2)
     demonstrations = demonstrations_at(targets, np.random.default_rng(seed), action="pointing", repetitions=repetitions)
-    model = InterpolativePHMM(n_states, 2, 3, resampled_frames=round(2.5 * n_states))
+    model = InterpolativePHMM(n_states, 2, 3, resampled_frames=round(2.5 * n_states), residuals="independent")
     return model.fit(demonstrations.sequences, np.repeat(theta, repetitions, axis=0))
 
 

@@ -72,7 +72,7 @@ def train_reaching_model(
     made with the same arguments by the present code, and written there otherwise.
     """
     source = f"synthetic demonstrator, seed {seed}, {repetitions} repetitions, code {code_digest(__name__)}"
-    model = InterpolativePHMM(n_states, 2, 3, resampled_frames=round(2.5 * n_states))
+    model = InterpolativePHMM(n_states, 2, 3, resampled_frames=round(2.5 * n_states), residuals="independent")
     stored = stored_model(InterpolativePHMM, cache)
     if (
         stored is not None
