@@ -7,7 +7,7 @@ is Gaussian in its whole course, and conditions on poses are linear.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -22,28 +22,17 @@ EXACT = 1e-9
 """Variance of a condition, relative to that of the movement there."""
 
 
-@dataclass(frozen=True)
-class Condition:
-    """A pose at one time.
-
-    Attributes:
-        progress: fraction of the movement, 0 to 1. missed: what the mean movement lacks there, (D,); NaN: anything.
-    """
-
-    progress: float
-    missed: Floats
-
-
-def deviation(conditions: list[Condition], covariance: Floats, n_samples: int) -> Floats:
+def deviation(missed_at: Mapping[float, Floats], covariance: Floats, n_samples: int) -> Floats:
     """The most likely deviation from the mean movement under all conditions. Shape (n_samples, D).
 
     Args:
-        conditions: as many as the six times of `movement_parts` can meet; others are met as well as possible.
+        missed_at: what the mean movement lacks (D,) at fractions of it; NaN: anything. As many as the six times of
+            `movement_parts` can meet; others are met as well as possible.
         covariance: of `movement_parts`, (6 D, 6 D). n_samples: of the movement.
     """
     dimension = len(covariance) // len(TIMES)
-    rows = np.kron(_splines()([one.progress for one in conditions]), np.eye(dimension))
-    missed = np.concatenate([one.missed for one in conditions])
+    rows = np.kron(_splines()(list(missed_at)), np.eye(dimension))
+    missed = np.concatenate(list(missed_at.values()))
     known = np.isfinite(missed)
     rows, missed = rows[known], missed[known]
     crossed = covariance @ rows.T

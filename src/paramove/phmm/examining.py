@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from paramove.documents import Floats
 from paramove.hmm import check_length, checked_sequence, checked_sequences, interpolate
 from paramove.phmm.adaptation import Adaptation
-from paramove.phmm.conditioning import Condition, deviation
+from paramove.phmm.conditioning import deviation
 from paramove.phmm.estimates import Examination, ParameterEstimate
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise
@@ -123,7 +123,7 @@ class ExaminingPHMM(ParametricHMM):
         executions.
         """
         mean, covariance = self.synthesize(theta, n_samples), self._covariance_of_executions()
-        conditions = []
+        missed: dict[float, Floats] = {}
         for progress, pose in via.items():
             wanted = np.asarray(pose, dtype=np.float64)
             if wanted.shape != mean.shape[1:] or np.isinf(wanted).any() or not 0.0 <= progress <= 1.0:
@@ -131,14 +131,13 @@ class ExaminingPHMM(ParametricHMM):
                     f"via has poses of {mean.shape[1]} numbers by fractions from 0 to 1, found shape {wanted.shape} at "
                     f"{progress}"
                 )
-            conditions.append(
-                Condition(progress, wanted - interpolate(mean, np.array([progress * (n_samples - 1)]))[0])
-            )
-        if not conditions:
+            missed[progress] = wanted - interpolate(mean, np.array([progress * (n_samples - 1)]))[0]
+        if not missed:
             return mean
-        if min(via) > START:
-            conditions.append(Condition(0.0, np.zeros(mean.shape[1])))
-        return mean + deviation(conditions, covariance, n_samples)
+        if min(missed) > START:
+            missed[0.0] = np.zeros(mean.shape[1])
+        result: Floats = mean + deviation(missed, covariance, n_samples)
+        return result
 
     def redirect(self, movement: ArrayLike, theta: ArrayLike, at: float, within: float = 0.3) -> Floats:
         """A movement (n, D) that from a fraction `at` of it on turns to another theta (P,). Shape (n, D).

@@ -63,10 +63,10 @@ def plot_theta(
     With labels (K, P) those whose region does not hold theta are red, and a line leads to the label.
     """
     axes = ax or _new_axes(5.5, 5.0)
-    found = [model.estimate(sequence) for sequence in sequences]
-    estimated, covariances = np.array([one.theta for one in found]), np.array([one.covariance for one in found])
+    flat, covariances = model.predict(sequences, return_cov=True)
+    estimated = flat.reshape(len(covariances), -1)
     labels = None if theta is None else np.asarray(theta, dtype=np.float64).reshape(estimated.shape)
-    held = np.ones(len(found), bool) if labels is None else levels_of(labels, estimated, covariances) <= 0.95
+    held = np.ones(len(estimated), bool) if labels is None else levels_of(labels, estimated, covariances) <= 0.95
     for number, (at, covariance) in enumerate(zip(estimated, covariances, strict=True)):
         colour = ACTION_COLOURS[0] if held[number] else WARN
         if estimated.shape[1] == 1:
