@@ -166,7 +166,8 @@ def likelihood() -> list[Row]:
 def parametric() -> list[Row]:
     """Parametric models of reaching, 80 states of 2 to 3 frames, a cuboid of 2 x 2 x 2 targets."""
     training = reaching_grid_demonstrations(np.random.default_rng(0))
-    local = InterpolativePHMM(80, 2, 3, resampled_frames=200).fit(training.sequences, training.theta)
+    local = InterpolativePHMM(80, 2, 3, resampled_frames=200, residuals="independent")
+    local.fit(training.sequences, training.theta)
     quadratic = QuadraticPHMM(n_states=20, d_min=4, d_max=6, resampled_frames=100).fit(
         training.sequences, training.theta
     )

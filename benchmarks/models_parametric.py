@@ -68,7 +68,7 @@ def estimate_rows(kind: str) -> list[tuple[str, Task | None, str]]:
     if kind == "neural":
         return [("paramove, neural", _all(NeuralPHMM(20, 4, 6).fit(training, theta), untrained), "")]
     if kind == "interpolative":
-        local = InterpolativePHMM(20, 4, 6, search_margin=MARGIN).fit(training, theta)
+        local = InterpolativePHMM(20, 4, 6, search_margin=MARGIN, residuals="independent").fit(training, theta)
         return [("paramove, interpolative 3 x 3", _all(local, untrained), ""), *_searches(local, untrained)]
     models = {
         residuals: PolynomialPHMM(20, 4, 6, degree=1 if kind == "linear" else 2, residuals=residuals).fit(

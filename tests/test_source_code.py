@@ -92,7 +92,7 @@ def test_a_model_of_older_code_is_trained_again(copy):
     edit(copy / "src/paramove/cli/main.py", '"Look at the nodes on the bus."', '"Nodes."')
     assert run(copy, REACHING, interpreted=True)[0] == old
     assert stored.stat().st_mtime_ns == written, "trained again for a change of the command line"
-    edit(copy / "src/paramove/demonstrations/synthetic.py", "def minimum_jerk", "SAMPLES = 1\n\n\ndef minimum_jerk")
+    edit(copy / "src/paramove/demonstrations/synthetic.py", "def leaning", "SAMPLES = 1\n\n\ndef leaning")
     assert run(copy, REACHING, interpreted=True)[0] == old
     assert stored.stat().st_mtime_ns > written
 

@@ -21,14 +21,13 @@ from paramove.demonstrations import (
     Demonstrator,
     corner_pairs,
     demonstrations_at,
-    minimum_jerk,
     nine_pairs,
     phase,
     table_place,
     table_targets,
 )
 from paramove.documents import Floats
-from paramove.hmm import resample
+from paramove.hmm import minimum_jerk, resample
 from paramove.observation import POSE_POINTS, ArmSizes, fitted_poses
 from paramove.phmm import MovementDescription
 from sim.persons.staging import Stop, staged

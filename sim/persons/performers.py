@@ -22,9 +22,9 @@ from paramove.demonstrations import (
     Demonstrator,
     Timing,
     Variation,
-    minimum_jerk,
 )
 from paramove.documents import Floats
+from paramove.hmm import minimum_jerk
 from paramove.observation import ArmSizes
 
 FIRST_SEED = 20_600

@@ -27,12 +27,12 @@ from paramove.demonstrations import (
     body_points,
     kept_clear,
     leaning,
-    minimum_jerk,
     overreach,
     swivel_towards,
     usual_elbow,
 )
 from paramove.documents import Floats
+from paramove.hmm import minimum_jerk
 
 SWIVEL_AT_REST = 0.25
 USUAL_DURATION_S = 3.2

@@ -37,10 +37,10 @@ from paramove.demonstrations import (
     data_folder,
     demonstrations_at,
     load_recordings,
-    minimum_jerk,
     table_targets,
 )
 from paramove.documents import Floats
+from paramove.hmm import minimum_jerk
 from studies.movements.measures import ThetaKind
 from studies.movements.method import Examples, joined
 from studies.movements.per_action import first_frames

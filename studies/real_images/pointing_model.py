@@ -17,11 +17,11 @@ from paramove.demonstrations import (
     SAMPLE_RATE_HZ,
     Demonstrations,
     elbow_positions,
-    minimum_jerk,
     swivel_towards,
     unit,
 )
 from paramove.documents import Floats
+from paramove.hmm import minimum_jerk
 from paramove.observation import POSE_POINTS, ArmSizes
 from paramove.phmm import CubicPHMM, MovementDescription
 

@@ -11,7 +11,8 @@ from paramove.action_space.training import arm_poses, table_action_demonstration
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
 from paramove.demonstrations import Demonstrations, corner_pairs, nine_pairs, table_place
 from paramove.demonstrations.blending import phase
-from paramove.demonstrations.synthetic import SAMPLE_RATE_HZ, minimum_jerk
+from paramove.demonstrations.synthetic import SAMPLE_RATE_HZ
+from paramove.hmm import minimum_jerk
 from paramove.phmm import LinearPHMM
 from tests.action_space.performances import PERSON, gaussian
 from tests.action_space.test_grammar import COMPLEX

@@ -5,8 +5,8 @@ import pytest
 
 from paramove.action_space.estimates import ThetaEstimate
 from paramove.action_space.target_detection import DetectionOptions, TargetDetector
-from paramove.demonstrations.synthetic import minimum_jerk
 from paramove.documents.input_error import InputError
+from paramove.hmm import minimum_jerk
 
 GOAL = np.array([0.4, 0.1, 0.07])
 BASE = np.array([0.0, -0.3, -0.3])

@@ -1,4 +1,4 @@
-"""Another unit, another frame rate, a beginning that is given as a movement: what a user is told."""
+"""Another unit, another frame rate, a beginning that is given as a movement: what is reported."""
 
 from __future__ import annotations
 

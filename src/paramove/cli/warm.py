@@ -100,7 +100,9 @@ def _interpolation() -> None:
     from paramove.phmm import InterpolativePHMM
 
     sequences, once = _sequences(), TrainingOptions(max_iterations=1)
-    InterpolativePHMM(5, 2, 8, options=once).fit(sequences, [0.0, 0.5, 1.0]).estimate(sequences[0])
+    for residuals in ("correlated", "independent"):
+        model = InterpolativePHMM(5, 2, 8, options=once, residuals=residuals)
+        model.fit(sequences, [0.0, 0.5, 1.0]).estimate(sequences[0])
 
 
 def _camera() -> CalibratedCamera:

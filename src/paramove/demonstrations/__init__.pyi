@@ -70,7 +70,6 @@ from .synthetic import Variation as Variation
 from .synthetic import arc as arc
 from .synthetic import kept_clear as kept_clear
 from .synthetic import leaning as leaning
-from .synthetic import minimum_jerk as minimum_jerk
 from .synthetic import overreach as overreach
 from .synthetic import table_place as table_place
 from .synthetic import table_targets as table_targets

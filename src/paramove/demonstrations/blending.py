@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from paramove.alignment import warp
 from paramove.demonstrations.arm import POINT_NAMES
 from paramove.demonstrations.reaching import Demonstrations, demonstrations_at
-from paramove.demonstrations.synthetic import FRAME, Demonstrator, Timing, minimum_jerk, table_place, table_targets
+from paramove.demonstrations.synthetic import FRAME, Demonstrator, Timing, table_place, table_targets
 from paramove.documents import Floats
-from paramove.hmm import checked_sequence, interpolate, resample
+from paramove.hmm import checked_sequence, interpolate, minimum_jerk, resample
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParametricHMM
 
 ALIGNED_FRAMES = 200

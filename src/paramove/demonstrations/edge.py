@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.demonstrations.synthetic import minimum_jerk
 from paramove.documents import Floats
+from paramove.hmm import minimum_jerk
 
 EDGE_HEIGHT = 0.05
 EDGE_WIDTH = 0.06

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from paramove.demonstrations.arm import ArmLengths, ArmPath, body_points, swivel_towards
 from paramove.documents import Floats
+from paramove.hmm import minimum_jerk
 
 Action = Literal["reaching", "pointing"]
 
@@ -183,13 +184,6 @@ def table_place(coordinates: ArrayLike, height: float = 0.07) -> Floats:
 def usual_elbow(target: Floats) -> Floats:
     """The elbow's preferred position: it follows the target forward, to the left and up, only partly. (3,)."""
     result: Floats = ELBOW_AT_COMFORT + ELBOW_PER_TARGET @ (target - COMFORTABLE_TARGET)
-    return result
-
-
-def minimum_jerk(progress: Floats, start: float, end: float) -> Floats:
-    """0 before start, 1 after end, smooth as a human reach in between (Flash and Hogan 1985)."""
-    x = np.clip((progress - start) / (end - start), 0.0, 1.0)
-    result: Floats = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
     return result
 
 

@@ -36,6 +36,7 @@ from .synthesis import Path as Path
 from .synthesis import Timing as Timing
 from .synthesis import at_progress as at_progress
 from .synthesis import expected_durations as expected_durations
+from .synthesis import minimum_jerk as minimum_jerk
 from .training import ConvergenceMonitor as ConvergenceMonitor
 from .training import LikelihoodDecreaseWarning as LikelihoodDecreaseWarning
 from .training import equal_segments as equal_segments

@@ -13,6 +13,13 @@ Path = Literal["linear", "smooth"]
 LONGEST_PATH = 1_000_000
 
 
+def minimum_jerk(progress: Floats, start: float, end: float) -> Floats:
+    """0 before start, 1 after end, smooth as a human reach in between (Flash and Hogan 1985)."""
+    x = np.clip((progress - start) / (end - start), 0.0, 1.0)
+    result: Floats = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+    return result
+
+
 def expected_durations(durations: Floats) -> Floats:
     """Expected number of frames of each state (2.28). Shape (N,)."""
     result: Floats = durations @ np.arange(1, durations.shape[1] + 1)

@@ -76,10 +76,11 @@ class Beginnings:
         error = {increments: sum(np.log(one) for _, one in results) for increments, results in compared.items()}
         increments = not error[False] < error[True]
         known = dict(zip(COMPARED, (one for one, _ in compared[increments]), strict=True))
-        near = np.abs(np.subtract.outer(np.arange(len(FRACTIONS)), COMPARED)).argmin(axis=1)
-        for number, chosen in list(known.items()):
-            others = [one for one in np.flatnonzero(np.take(COMPARED, near) == number).tolist() if one not in known]
-            known |= dict(zip(others, (one for one, _ in of(others, increments, (chosen.shrinkage,))), strict=True))
+        nearest = np.abs(np.subtract.outer(np.arange(len(FRACTIONS)), COMPARED)).argmin(axis=1)
+        for position, number in enumerate(COMPARED):
+            others = [one for one in np.flatnonzero(nearest == position).tolist() if one != number]
+            fitted = of(others, increments, (known[number].shrinkage,))
+            known |= dict(zip(others, (one for one, _ in fitted), strict=True))
         regressions = [known[number] for number in range(len(FRACTIONS))]
         lengths = np.log([len(sequence) for sequence in sequences])
         outside = LEAST_DURATION_MARGIN + float(lengths.std())

@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
-from paramove.hmm import check_length, checked_sequence, checked_sequences, interpolate
+from paramove.hmm import check_length, checked_sequence, checked_sequences, interpolate, minimum_jerk
 from paramove.phmm.adaptation import Adaptation
 from paramove.phmm.conditioning import deviation
 from paramove.phmm.estimates import Examination, ParameterEstimate
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import ParametricHMM, TrainingData, checked_theta
-from paramove.phmm.performance import Performances, movement_parts, state_averages
+from paramove.phmm.performance import OUTLIER_SHRINKAGE, Performances, movement_parts, state_averages
 
 Residuals = Literal["independent", "correlated"]
 INDEPENDENT = "this model has independent residuals: train it with residuals='correlated'"
-FOLLOWED, LEAST_CORRELATED = 0.9, 0.1
-"""Fraction of the correlations of executions that conditions follow, and which fraction of them is known at least."""
+FOLLOWED = 0.9
+"""Fraction of the correlations of executions that conditions follow."""
 START = 0.05
 """Conditions up to this fraction of a movement are conditions on its start."""
 
@@ -71,8 +71,7 @@ class ExaminingPHMM(ParametricHMM):
         return model._estimated(recorded, model.performances_)[0]
 
     def _recorded(self, sequence: ArrayLike, finished: bool) -> Floats:
-        self._check_trained()
-        recorded = checked_sequence(sequence, self.covariances_.shape[-1])
+        recorded = checked_sequence(sequence, self._dimension())
         self._warn(recorded, finished)
         return recorded
 
@@ -150,8 +149,7 @@ class ExaminingPHMM(ParametricHMM):
         made = checked_sequence(movement, self._dimension())
         if not 0.0 <= at < 1.0 or not within > 0.0:
             raise ValueError(f"expected 0 <= at < 1 and within > 0, found {at} and {within}")
-        progress = np.clip((np.linspace(0.0, 1.0, len(made)) - at) / min(within, 1.0 - at), 0.0, 1.0)[:, None]
-        turned = progress**3 * (10.0 - 15.0 * progress + 6.0 * progress**2)
+        turned = minimum_jerk(np.linspace(0.0, 1.0, len(made)), at, min(at + within, 1.0))[:, None]
         result: Floats = made + turned * (self.synthesize(theta, len(made)) - made)
         return result
 
@@ -164,10 +162,10 @@ class ExaminingPHMM(ParametricHMM):
         if self.performances_ is None:
             raise ValueError(INDEPENDENT)
         regression = self.performances_.complete
-        covariance, shrinkage = regression.root @ regression.root.T, min(regression.shrinkage, 1.0 - LEAST_CORRELATED)
+        covariance = regression.root @ regression.root.T
         diagonal = np.diag(np.diagonal(covariance))
-        # What tells outliers takes half of the correlations for chance; what is made follows nearly all of them.
-        result: Floats = diagonal + FOLLOWED / (1.0 - shrinkage) * (covariance - diagonal)
+        # Detection of outliers takes half of the correlations for chance; synthesis follows nearly all of them.
+        result: Floats = diagonal + FOLLOWED / (1.0 - OUTLIER_SHRINKAGE) * (covariance - diagonal)
         return result
 
     def adapt(self, sequences: Sequence[ArrayLike], theta: ArrayLike | None = None) -> Self:
@@ -181,13 +179,13 @@ class ExaminingPHMM(ParametricHMM):
         Raises NotFittedError before training, ValueError for sequences and labels that do not fit.
         """
         self._check_trained()
-        recorded = [checked_sequence(one, self.covariances_.shape[-1]) for one in checked_sequences(sequences)]
-        known = np.array([self.estimate(one).theta for one in recorded]) if theta is None else theta
+        recorded = [self._recorded(one, finished=True) for one in checked_sequences(sequences)]
+        known = np.array([self._estimate(one, finished=True).theta for one in recorded]) if theta is None else theta
         labels = self._checked_theta(checked_theta(known, len(recorded)))
         averages = []
         for sequence, one in zip(recorded, labels, strict=True):
             frames = self._checked(sequence)
-            averages.append(state_averages(self.at(one).responsibilities(frames).T, frames)[0])
+            averages.append(state_averages(self.at(one).responsibilities(frames).T, frames))
         adaptation = Adaptation.of(self.monomials_, labels)
         missed = np.stack(averages) - self.state_means(labels)
         change = adaptation.change(missed.reshape(len(labels), -1))
@@ -227,8 +225,7 @@ class ExaminingPHMM(ParametricHMM):
             self.performances_ = self.performances_.expecting(noise)
 
     def _checked(self, sequence: ArrayLike) -> Floats:
-        self._check_trained()
-        checked = self._resampled(checked_sequence(sequence, self.covariances_.shape[-1]))
+        checked = self._resampled(checked_sequence(sequence, self._dimension()))
         check_length(len(checked), self.n_states, self.d_min_, self.d_max_)
         return checked
 

@@ -128,7 +128,7 @@ class InterpolativePHMM(ExaminingPHMM):
         self.monomials_ = Monomials.of_degree(3 if max(grid.shape) > 3 else 2, grid.points())
 
     def _coordinates(self, theta: ArrayLike) -> Floats:
-        values = self._checked_theta(theta)  # which says that a model is not trained
+        values = self._checked_theta(theta)  # raises if the model is not trained
         return self.grid_.coordinates(values)
 
     def at(self, theta: ArrayLike) -> LeftRightHMM:

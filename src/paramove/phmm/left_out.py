@@ -10,19 +10,14 @@ from paramove.documents import Floats, Ints
 MAX_FOLDS = 10
 
 
-def fold_numbers(groups: Ints, least: int = 3) -> Ints:
-    """Number below `MAX_FOLDS` of each movement's fold, from its group (K,); groups stay together. Shape (K,).
+def folds_of(groups: Ints, least: int = 3) -> Iterator[tuple[Ints, Ints]]:
+    """Tested movements and the others, of up to `MAX_FOLDS` folds that leave at least two others.
 
-    For fewer than `least` groups, parts of their movements.
+    Movements of a group (K,) stay together; those of fewer than `least` groups do not.
     """
     different = np.unique(groups)
-    numbers = np.searchsorted(different, groups) if len(different) >= least else np.arange(len(groups))
-    return np.asarray(numbers % MAX_FOLDS, dtype=np.int64)
-
-
-def folds_of(groups: Ints, least: int = 3) -> Iterator[tuple[Ints, Ints]]:
-    """Tested movements and the others, for each fold of `fold_numbers` that leaves at least two others."""
-    numbers = fold_numbers(groups, least)
+    each = np.searchsorted(different, groups) if len(different) >= least else np.arange(len(groups))
+    numbers = each % MAX_FOLDS
     for fold in np.unique(numbers):
         tested, others = np.flatnonzero(numbers == fold), np.flatnonzero(numbers != fold)
         if len(others) > 1:

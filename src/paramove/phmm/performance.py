@@ -226,10 +226,10 @@ def noisy_pace(sequence: Floats, noise: float) -> NoisyPace:
     return NoisyPace(np.log(np.sqrt(without) + small), np.log(np.sqrt(minimum) + small), of_steps)
 
 
-def state_averages(gamma: Floats, sequence: Floats) -> tuple[Floats, Floats]:
-    """Mean of the frames in each state by responsibilities (N, T), (N, D), and how many frames those are, (N,)."""
-    weights = gamma.sum(axis=1)
-    return (gamma @ sequence) / weights[:, None], weights
+def state_averages(gamma: Floats, sequence: Floats) -> Floats:
+    """Mean of the frames in each state by responsibilities (N, T). Shape (N, D)."""
+    result: Floats = (gamma @ sequence) / gamma.sum(axis=1)[:, None]
+    return result
 
 
 def movement_parts(sequence: Floats) -> Floats:
@@ -239,9 +239,15 @@ def movement_parts(sequence: Floats) -> Floats:
     included since theta determines the end of a movement more exactly than its course. Parts of equal time need no
     alignment by a model, which for movements that vary little would be decided by noise.
     """
-    frames = resample(sequence, PARTS * PART_FRAMES)
-    means = frames.reshape(PARTS, PART_FRAMES, -1).mean(axis=1)
-    return np.concatenate([means, frames[-1:]]).ravel()
+    means = part_means(sequence, PARTS, PART_FRAMES)
+    return np.concatenate([means, sequence[-1:]]).ravel()
+
+
+def part_means(sequence: Floats, n_parts: int, n_frames: int) -> Floats:
+    """Means of parts of equal time, of so many interpolated frames each. Shape (n_parts, D)."""
+    frames = resample(sequence, n_parts * n_frames)
+    result: Floats = frames.reshape(n_parts, n_frames, -1).mean(axis=1)
+    return result
 
 
 def groups_of(groups: ArrayLike | None, theta: Floats) -> Ints:

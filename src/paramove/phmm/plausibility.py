@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from paramove.documents import Floats
-from paramove.hmm import resample
+from paramove.phmm.performance import part_means
 
 OTHER_UNIT = 50.0
 """Values of that many times the largest of the training have another unit: cm or mm for m."""
@@ -85,6 +85,5 @@ class TrainingRange:
 
 def peak_step(sequence: Floats) -> float:
     """Largest distance between the means of successive tenths of the time, per frame: noise of frames hardly counts."""
-    means = resample(sequence, PARTS * PART_FRAMES).reshape(PARTS, PART_FRAMES, -1).mean(axis=1)
-    steps = np.linalg.norm(np.diff(means, axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(part_means(sequence, PARTS, PART_FRAMES), axis=0), axis=1)
     return float(steps.max()) * PARTS / len(sequence)

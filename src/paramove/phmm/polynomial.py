@@ -109,7 +109,7 @@ class PolynomialPHMM(ExaminingPHMM):
         averages = []
         for sequence, theta in zip(data.sequences, data.theta, strict=True):
             own = replace(common, means=trained.coefficients @ monomials.at(theta))
-            averages.append(state_averages(own.expectation(sequence)[1].T, sequence)[0].ravel())
+            averages.append(state_averages(own.expectation(sequence)[1].T, sequence).ravel())
         return np.stack(averages)
 
     def _set_learned(self, monomials: Monomials, learned: RegressedParameters) -> None:
