@@ -109,5 +109,7 @@ def test_what_does_not_fit_is_named(trained: dict[type[ParametricHMM], Parametri
         model.adapt(shown, [0.1, 0.2, 0.3])
     with pytest.raises(ValueError, match="3 dimensions per frame, the sequence has 2"):
         model.adapt([one[:, :2] for one in shown], SHOWN)
+    with pytest.raises(ValueError, match="unit of the training"):
+        model.adapt([1000.0 * one for one in shown], SHOWN)
     with pytest.raises(ValueError, match="no sequences"):
         model.adapt([], np.zeros((0, 2)))
