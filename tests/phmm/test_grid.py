@@ -55,3 +55,20 @@ def test_grid_is_found_from_labels() -> None:
     grid = ParameterGrid.from_theta(np.random.default_rng(0).permutation(np.repeat(points, 3, axis=0)))
     assert grid.shape == (3, 2)
     assert_allclose(grid.points(), points, rtol=0.0, atol=1e-12)
+
+
+def test_regions_cover_the_grid_and_its_margin_once() -> None:
+    grid = ParameterGrid.from_lines([0.0, 1.0, 4.0], [0.0, 2.0])
+    regions = list(grid.regions(0.25))
+    assert len(regions) == 4 * 4
+    assert_allclose(sum(np.ptp(bounds, axis=1).prod() for _, bounds in regions), 1.5 * 1.5)
+    assert {tuple(grid.cell(middle)) for middle, _ in regions} == {(0, 0), (1, 0)}
+    for middle, bounds in regions:
+        assert ((bounds[:, 0] < middle) & (middle < bounds[:, 1])).all()
+
+
+def test_a_cell_is_that_of_the_weights() -> None:
+    grid = ParameterGrid.from_lines([0.0, 1.0, 4.0], [0.0, 2.0, 3.0, 5.0])
+    for position in np.random.default_rng(0).uniform(-0.3, 1.3, (50, 2)):
+        indices, _ = grid.weights(position[None], clamped=False)
+        assert indices.min() == np.ravel_multi_index(tuple(grid.cell(position)), grid.shape)

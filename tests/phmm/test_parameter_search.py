@@ -13,7 +13,6 @@ from scipy.stats import chi2
 
 from paramove.phmm import InterpolativePHMM, NeuralPHMM, ParametricHMM, QuadraticPHMM
 from paramove.phmm.interpolation_kernels import expectation_at, value_at
-from paramove.phmm.interpolation_search import cell_of, region_at, region_of
 from tests.phmm.movements import FEW, numerical_gradient, shown, wave
 from tests.phmm.table import RASTER_CM, table_movements
 
@@ -33,11 +32,6 @@ def two() -> InterpolativePHMM:
 UNSEEN, LABELS = table_movements(7, 5, 1, seed=1)
 
 
-def cell_at(model: InterpolativePHMM, place: np.ndarray) -> np.ndarray:
-    knots, counts, *_ = model._kernel_arrays()
-    return cell_of(region_of(region_at(place, knots, counts), counts), counts)
-
-
 @PROPERTY
 @given(st.tuples(st.floats(-0.2, 1.2), st.floats(-0.2, 1.2)), st.integers(0, 34))
 def test_value_and_gradient_are_those_of_the_model(
@@ -47,10 +41,10 @@ def test_value_and_gradient_are_those_of_the_model(
     at, columns, arrays = np.array(place), np.ascontiguousarray(UNSEEN[number].T), three._kernel_arrays()
     if min(abs(x - knot) for x in place for knot in (0.0, 0.5, 1.0)) < 1e-4:
         return  # a kink has two gradients
-    cell = cell_at(three, at)
-    value, gradient, information = expectation_at(at, cell, 1.0, columns, *arrays)
+    cell = three.grid_.cell(at)
+    value, gradient, information = expectation_at(at, cell, columns, *arrays)
     assert_allclose(value, three.log_likelihood(UNSEEN[number], at), rtol=1e-9, atol=1e-6)
-    expected = numerical_gradient(lambda u: value_at(u, cell, 1.0, columns, *arrays), at, 1e-6)
+    expected = numerical_gradient(lambda u: value_at(u, cell, columns, *arrays), at, 1e-6)
     assert_allclose(gradient, expected, rtol=1e-3, atol=1e-3 * np.abs(expected).max() + 1e-2)
     assert np.linalg.eigvalsh(information).min() > 0.0
 
@@ -61,7 +55,7 @@ def dense_maximum(model: InterpolativePHMM, sequence: np.ndarray) -> float:
     dimension = model.grid_.dimension
 
     def values(places: list[np.ndarray]) -> np.ndarray:
-        return np.array([value_at(one, cell_at(model, one), 1.0, columns, *arrays) for one in places])
+        return np.array([value_at(one, model.grid_.cell(one), columns, *arrays) for one in places])
 
     line = np.linspace(-0.25, 1.25, {1: 301, 2: 31, 3: 13}[dimension])
     places = [np.array(one) for one in itertools.product(line, repeat=dimension)]

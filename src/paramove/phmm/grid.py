@@ -1,7 +1,8 @@
 """Grids in parameter space: from theta in the user's unit to interpolation coordinates and weights."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Self
 
 import numpy as np
@@ -106,6 +107,22 @@ class ParameterGrid:
         mesh = np.meshgrid(*self.knots, indexing="ij")
         return self.theta(np.stack([axis.ravel() for axis in mesh], axis=1))
 
+    def cell(self, position: Floats) -> Ints:
+        """The cell of coordinates (P,), outside that at the border: numbers of its lower grid lines, (P,)."""
+        lines = zip(self.knots, position, strict=True)
+        return np.array([np.searchsorted(knots[1:-1], at, side="right") for knots, at in lines], dtype=np.int64)
+
+    def regions(self, margin: float) -> Iterator[tuple[Floats, Floats]]:
+        """Middle (P,) and bounds (P, 2) of cells, a single one in halves, and of the parts outside up to a margin."""
+        sides = []
+        for knots in self.knots:
+            inside = knots if len(knots) > 2 else np.array([0.0, 0.5, 1.0])
+            lines = np.concatenate([[-margin], inside, [1.0 + margin]])
+            sides.append(np.column_stack([lines[:-1], lines[1:]]))
+        for region in product(*sides):
+            bounds = np.stack(region)
+            yield bounds.mean(axis=1), bounds
+
     def nearest(self, theta: Floats) -> tuple[Ints, Floats]:
         """Index of the nearest grid point of each theta, and the distance as a fraction of the cell. Shapes (K,)."""
         coordinates = self.coordinates(theta)
@@ -126,7 +143,7 @@ class ParameterGrid:
         indices = np.zeros((len(positions), 1), dtype=np.int64)
         weights = np.ones((len(positions), 1))
         for component, knots in zip(positions.T, self.knots, strict=True):
-            cell = np.clip(np.searchsorted(knots, component, side="right") - 1, 0, len(knots) - 2)
+            cell = np.searchsorted(knots[1:-1], component, side="right")
             fraction = ((component - knots[cell]) / (knots[cell + 1] - knots[cell]))[:, None]
             lower = indices * len(knots) + cell[:, None]
             indices = np.concatenate([lower, lower + 1], axis=1)

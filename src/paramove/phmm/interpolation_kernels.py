@@ -118,8 +118,7 @@ def _squares(columns: Floats, n: int, out: Floats) -> None:
 
 @compiled
 def outputs_at(
-    columns: Floats, ends: Ints, numbers: Ints, weights: Floats, clamped: Floats, means: Floats, covariances: Floats,
-    smoothing: float,
+    columns: Floats, ends: Ints, numbers: Ints, weights: Floats, clamped: Floats, means: Floats, covariances: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
     """ln b_i(x_t) (N, T), Cholesky factors (N, D D), means (N, D), and whitened residuals (N, D, widest window)."""
     dim, n_frames = columns.shape
@@ -141,21 +140,21 @@ def outputs_at(
         _forward_substituted(roots[i], dim, n, white[i])
         _squares(white[i], n, squares)
         for f in range(n):
-            out[i, begin + f] = log_norm - 0.5 * smoothing * squares[f]
+            out[i, begin + f] = log_norm - 0.5 * squares[f]
     return out, roots, centres, white
 
 
 @compiled
 def value_at(
-    u: Floats, cell: Ints, smoothing: float, columns: Floats, knots: Floats, counts: Ints, means: Floats,
-    covariances: Floats, durations: Floats, d_min: int,
+    u: Floats, cell: Ints, columns: Floats, knots: Floats, counts: Ints, means: Floats, covariances: Floats,
+    durations: Floats, d_min: int,
 ) -> float:  # fmt: skip
-    """ln p(X | lambda^u); squared distances are multiplied by `smoothing`, 1 for the model itself."""
+    """ln p(X | lambda^u)."""
     ends = feasible_ends(means.shape[1], d_min, durations.shape[2], columns.shape[1])
     numbers = corner_numbers(cell, counts)
     weights, _ = corner_weights(u, cell, knots, False)
     clamped, _ = corner_weights(u, cell, knots, True)
-    out, _, _, _ = outputs_at(columns, ends, numbers, weights, clamped, means, covariances, smoothing)
+    out, _, _, _ = outputs_at(columns, ends, numbers, weights, clamped, means, covariances)
     value, _, _ = _segments(out, _log_durations(durations, numbers, clamped), d_min)
     return value
 
@@ -183,20 +182,17 @@ def _segments(out: Floats, log_duration: Floats, d_min: int) -> tuple[float, Flo
 
 @compiled
 def expectation_at(
-    u: Floats, cell: Ints, smoothing: float, columns: Floats, knots: Floats, counts: Ints, means: Floats,
-    covariances: Floats, durations: Floats, d_min: int,
+    u: Floats, cell: Ints, columns: Floats, knots: Floats, counts: Ints, means: Floats, covariances: Floats,
+    durations: Floats, d_min: int,
 ) -> tuple[float, Floats, Floats]:  # fmt: skip
-    """ln p, its exact gradient in u (P,), and the information about u in the means with known states (P, P).
-
-    Squared distances are multiplied by `smoothing`, 1 for the model itself.
-    """
+    """ln p, its exact gradient in u (P,), and the information about u in the means with known states (P, P)."""
     dimension, dim = len(u), columns.shape[0]
     n_states, d_max = means.shape[1], durations.shape[2]
     ends = feasible_ends(n_states, d_min, d_max, columns.shape[1])
     numbers = corner_numbers(cell, counts)
     weights, slopes = corner_weights(u, cell, knots, False)
     clamped, clamped_slopes = corner_weights(u, cell, knots, True)
-    out, roots, _, white = outputs_at(columns, ends, numbers, weights, clamped, means, covariances, smoothing)
+    out, roots, _, white = outputs_at(columns, ends, numbers, weights, clamped, means, covariances)
     log_duration = _log_durations(durations, numbers, clamped)
     value, gamma, counted = _segments(out, log_duration, d_min)
     gradient, information = np.zeros(dimension), np.zeros((dimension, dimension))
@@ -219,7 +215,7 @@ def expectation_at(
                 pulled[k, n] = white[i, k, f]
             n += 1
         for k in range(dim):
-            score[k, 0] = smoothing * dot(pulled[k, :n], frame_weights[:n])
+            score[k, 0] = dot(pulled[k, :n], frame_weights[:n])
         for p in range(dimension):
             for k in range(dim):
                 moved[k, p] = 0.0
@@ -229,12 +225,12 @@ def expectation_at(
         for p in range(dimension):
             for q in range(p + 1):
                 for k in range(dim):
-                    information[p, q] += smoothing * weight * moved[k, p] * moved[k, q]
-        _covariance_score(roots[i], dim, pulled, frame_weights, n, weight / smoothing, score_matrix, flat)
+                    information[p, q] += weight * moved[k, p] * moved[k, q]
+        _covariance_score(roots[i], dim, pulled, frame_weights, n, weight, score_matrix, flat)
         _backward_substituted(roots[i], dim, 1, score)
         for c in range(len(numbers)):
             from_means[c] += dot(means[numbers[c], i], score[:, 0])
-            from_covariances[c] += 0.5 * smoothing * dot(flat, covariances[numbers[c], i])
+            from_covariances[c] += 0.5 * dot(flat, covariances[numbers[c], i])
             for d in range(d_min - 1, d_max):
                 if counted[i, d] > 0.0:
                     from_covariances[c] += counted[i, d] * durations[numbers[c], i, d] / np.exp(log_duration[i, d])
