@@ -57,12 +57,17 @@ def covered(estimate: Estimate, true: Floats, fraction: float = 0.95) -> float |
     """1 if the true theta lies in the region of this probability, else 0; None without one."""
     if estimate.covariance is None:
         return None
-    difference = true - estimate.theta
+    return float(squared_deviations(estimate.theta, estimate.covariance, true) <= chi2.ppf(fraction, len(true)))
+
+
+def squared_deviations(theta: Floats, covariance: Floats, true: Floats) -> float:
+    """Squared distance of the true theta in deviations; infinite for what is no covariance."""
+    difference = true - theta
     try:
-        squared = float(difference @ np.linalg.solve(estimate.covariance, difference))
+        squared = float(difference @ np.linalg.solve(covariance, difference))
     except np.linalg.LinAlgError:
-        return 0.0
-    return float(0.0 <= squared <= chi2.ppf(fraction, len(true)))
+        return np.inf
+    return squared if squared >= 0.0 else np.inf
 
 
 def auroc(genuine: Floats, others: Floats) -> float:

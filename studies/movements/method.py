@@ -37,6 +37,7 @@ class Examples:
         groups: number of the fold unit (person, target) of each, shape (K,): hyper-parameters are chosen by leaving
             whole units out, never by leaving out single repetitions.
         rate_hz: frames per second.
+        tip: which body point is the fingertip.
     """
 
     sequences: list[Floats]
@@ -44,6 +45,7 @@ class Examples:
     labels: list[str]
     groups: Ints
     rate_hz: float
+    tip: int
 
     def __len__(self) -> int:
         return len(self.sequences)
@@ -79,6 +81,7 @@ def joined(parts: Iterable[Examples]) -> Examples:
         [label for part in several for label in part.labels],
         np.concatenate([part.groups for part in several]),
         several[0].rate_hz,
+        several[0].tip,
     )
 
 

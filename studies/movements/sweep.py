@@ -213,7 +213,7 @@ def missing_libraries(row: Row) -> list[str]:
 
 def fold_digest(fold: Fold) -> str:
     """Digest of all numbers and labels of a fold."""
-    digest = hashlib.sha256(f"{fold.kind} {fold.tip} {fold.beginnings}".encode())
+    digest = hashlib.sha256(f"{fold.kind} {fold.train.tip} {fold.beginnings}".encode())
     for examples in (fold.train, fold.test):
         digest.update(repr((examples.labels, examples.rate_hz, examples.groups.tolist())).encode())
         digest.update(examples.theta.tobytes())

@@ -65,7 +65,6 @@ class Fold:
         train, test: movements.
         others: movements of other kinds by whom or what was left out, for rejection.
         kind: what theta is.
-        tip: which body point is the fingertip.
         beginnings: the kind is estimated while the movement goes on.
         own: a few movements of the person who is tested, to adapt to.
     """
@@ -76,7 +75,6 @@ class Fold:
     test: Examples
     others: list[Floats]
     kind: ThetaKind
-    tip: int
     beginnings: bool = False
     own: Examples | None = None
 
@@ -130,11 +128,11 @@ def grid_tasks(seeds: Sequence[int] = (0, 1, 2, 3, 4)) -> dict[str, list[Fold]]:
         for action, other in zip(GRID_ACTIONS, GRID_ACTIONS[::-1], strict=True):
             others = test[other].sequences
             tasks[f"raster/{action}"].append(
-                Fold(f"raster/{action}", str(seed), train[action], test[action], others, "raster", 5)
+                Fold(f"raster/{action}", str(seed), train[action], test[action], others, "raster")
             )
         both, tests = joined(train.values()), joined(test.values())
-        tasks["raster/actions"].append(Fold("raster/actions", str(seed), both, tests, [], "raster", 5))
-        tasks["raster/beginnings"].append(Fold("raster/beginnings", str(seed), both, tests, [], "raster", 5, True))
+        tasks["raster/actions"].append(Fold("raster/actions", str(seed), both, tests, [], "raster"))
+        tasks["raster/beginnings"].append(Fold("raster/beginnings", str(seed), both, tests, [], "raster", True))
     return tasks
 
 
@@ -142,7 +140,7 @@ def few_tasks(seeds: Sequence[int] = tuple(range(20))) -> dict[str, list[Fold]]:
     """Few or tidy demonstrations, of synthetic movements, by name."""
     tasks = {
         f"scripted/{name}": [
-            Fold(f"scripted/{name}", str(seed), *_scripted(deviation, seed), [], "place", 0) for seed in seeds
+            Fold(f"scripted/{name}", str(seed), *_scripted(deviation, seed), [], "place") for seed in seeds
         ]
         for name, deviation in SCRIPTED.items()
     }
@@ -150,7 +148,7 @@ def few_tasks(seeds: Sequence[int] = tuple(range(20))) -> dict[str, list[Fold]]:
         name = f"raster/{repetitions} repetition{'s' if repetitions > 1 else ''}"
         tasks[name] = [
             Fold(name, str(seed), _grid("reaching", 3, 3, repetitions, [seed, 2]),
-                 _grid("reaching", 7, 5, 2, [seed, 3]), [], "raster", 5)
+                 _grid("reaching", 7, 5, 2, [seed, 3]), [], "raster")
             for seed in seeds
         ]  # fmt: skip
     return tasks
@@ -169,7 +167,7 @@ def _scripted(deviation: float, seed: int) -> tuple[Examples, Examples]:
             noise = SCRIPTED_NOISE_M * rng.standard_normal((SCRIPTED_FRAMES, 3))
             sequences.append(begin + progress * (target + end - begin) + noise)
         groups = np.repeat(np.arange(len(targets)), repetitions)
-        return Examples(sequences, theta, ["scripted"] * len(theta), groups, SAMPLE_RATE_HZ)
+        return Examples(sequences, theta, ["scripted"] * len(theta), groups, SAMPLE_RATE_HZ, 0)
 
     return to(table_targets(3, 3)[0], 4), to(table_targets(7, 5)[0], 4)
 
@@ -276,10 +274,10 @@ def _pointing_fold(
             [one.action for one in movements],
             np.array([recordings.subjects.index(one.subject) if by_person else one.target_id for one in movements]),
             RATE_HZ,
+            recordings.fingertip,
         )
 
-    tip = recordings.fingertip
-    return Fold(task, name, examples(train), examples(test), [], "direction", tip)
+    return Fold(task, name, examples(train), examples(test), [], "direction")
 
 
 def _persons(table: Recordings, action: str) -> list[Fold]:
@@ -290,7 +288,7 @@ def _persons(table: Recordings, action: str) -> list[Fold]:
         train = _table_examples([one for one in own if one.subject != subject], table.fingertip, _TO_GRASP)
         test = _table_examples([one for one in own if one.subject == subject], table.fingertip, _TO_GRASP)
         if len(train) and len(test):
-            folds.append(Fold(f"table/{action}", str(subject), train, test, others, "place", table.fingertip))
+            folds.append(Fold(f"table/{action}", str(subject), train, test, others, "place"))
     return folds
 
 
@@ -307,7 +305,7 @@ def _few_persons(table: Recordings, name: str, actions: Sequence[str], part: Par
         train = _table_examples([one for one in own if one.subject in chosen], table.fingertip, part)
         for subject in sorted(set(subjects) - chosen):
             test = _table_examples([one for one in own if one.subject == subject], table.fingertip, part)
-            folds.append(Fold(name, f"{draw}/{subject}", train, test, [], "place", table.fingertip))
+            folds.append(Fold(name, f"{draw}/{subject}", train, test, [], "place"))
     return folds
 
 
@@ -319,7 +317,7 @@ def _kinds(table: Recordings, name: str, part: Part, *, beginnings: bool = False
             continue
         train = _table_examples(rest, table.fingertip, part)
         test = _table_examples(list(table.of(subject=subject)), table.fingertip, part)
-        folds.append(Fold(name, str(subject), train, test, [], "place", table.fingertip, beginnings))
+        folds.append(Fold(name, str(subject), train, test, [], "place", beginnings))
     return folds
 
 
@@ -340,7 +338,7 @@ def _table_examples(movements: list[RecordedMovement], tip: int, part: Part) -> 
     theta = np.array([one.target for one in movements]).reshape(-1, 3)
     theta = np.where(np.isfinite(theta), theta, starts)
     return Examples(
-        sequences, theta, [one.action for one in movements], np.array([one.subject for one in movements]), RATE_HZ
+        sequences, theta, [one.action for one in movements], np.array([one.subject for one in movements]), RATE_HZ, tip
     )
 
 
@@ -354,4 +352,4 @@ def _grid(action: str, columns: int, rows: int, repetitions: int, seed: Sequence
     demonstrations = demonstrations_at(targets, rng, action=action, repetitions=repetitions)  # type: ignore[arg-type]
     theta = np.repeat(coordinates, repetitions, axis=0)
     cells = np.repeat(np.arange(len(targets)), repetitions)
-    return Examples(demonstrations.sequences, theta, [action] * len(theta), cells, SAMPLE_RATE_HZ)
+    return Examples(demonstrations.sequences, theta, [action] * len(theta), cells, SAMPLE_RATE_HZ, 5)

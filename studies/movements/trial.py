@@ -59,7 +59,7 @@ def _single_action(method: Method, fold: Fold, values: Numbers, seconds: dict[st
         made = {tuple(theta): method.synthesize(theta, FRAMES) for theta in fold.test.theta}
         seconds["synthesize"] = (time.perf_counter() - began) / len(made)
         for x, theta in zip(fold.test.sequences, fold.test.theta, strict=True):
-            _add(values, synthesis_errors(made[tuple(theta)], x, fold.tip))
+            _add(values, synthesis_errors(made[tuple(theta)], x, fold.test.tip))
     if THETA in method.can:
         began = time.perf_counter()
         estimates = [method.estimate(x) for x in fold.test.sequences]

@@ -10,6 +10,7 @@ from typing import Any
 from studies.movements.method import BEGINNINGS, CLASSES, Method
 from studies.movements.per_action import ByElapsedTime, PerAction
 from studies.movements.sweep import Row
+from studies.peers.gaussian_process import FrameProcess
 from studies.peers.hidden_markov import CellHMMs, GaussianHMM
 from studies.peers.input_driven_hmm import InputDrivenHMM
 from studies.peers.minirocket import MiniRocket
@@ -72,11 +73,33 @@ def ridge_rows() -> list[Row]:
     rest = (AlignedRidge, candidates, ("tslearn", "scikit-learn"))
     return [
         Row("ridge from all frames", lambda seed: FrameRidge(), "", ("scikit-learn",)),
-        Row("ridge from position and velocity", lambda seed: MotionRidge(), "", ("scikit-learn",)),
+        *(Row(name, partial(_moving, *parameters), repr(parameters), ("scikit-learn",)) for name, parameters in MOVING),
         *both("DTW + PCA + quadratic ridge, diagonal", *rest),
         *both("DTW + PCA + quadratic ridge, full covariance", *rest, covariance="full"),
         *both("PCA + quadratic ridge, full covariance", *rest, covariance="full", warped=False),
     ]
+
+
+MOVING: list[tuple[str, tuple[Any, Any]]] = [
+    ("ridge from position and velocity", ("all", "position and velocity")),
+    ("ridge from the fingertip's position", ("fingertip", "position")),
+    ("ridge from the fingertip's position and velocity", ("fingertip", "position and velocity")),
+    ("ridge from the fingertip at constant velocity", ("fingertip", "constant velocity")),
+]
+
+
+def _moving(points: Any, motion: Any, seed: int) -> Method:
+    return MotionRidge(points, motion)
+
+
+def gaussian_process_rows() -> list[Row]:
+    """Gaussian processes on resampled frames."""
+    candidates = grid_of(components=[4, 8, 16])
+    return both("Gaussian processes", FrameProcess, candidates, ("scikit-learn",), whole=_only)
+
+
+def _only(make_one: Callable[[], Method]) -> Method:
+    return make_one()
 
 
 def promp_rows() -> list[Row]:
@@ -113,4 +136,4 @@ def classifier_rows() -> list[Row]:
 
 def peer_rows() -> list[Row]:
     """All rows of other people's methods."""
-    return [*ridge_rows(), *promp_rows(), *classifier_rows(), *hmm_rows()]
+    return [*ridge_rows(), *gaussian_process_rows(), *promp_rows(), *classifier_rows(), *hmm_rows()]

@@ -24,6 +24,7 @@ from studies.peers.linear_gaussian import LinearGaussian, QuadraticFeatures
 ALPHAS = np.logspace(-4, 3, 15)
 FRAME_ALPHAS = np.logspace(-6, 3, 19)
 VELOCITY_FRAMES = 6
+Motion = Literal["position", "position and velocity", "constant velocity"]
 
 
 class FrameRidge(NotAble):
@@ -43,27 +44,48 @@ class FrameRidge(NotAble):
 
 
 class MotionRidge(NotAble):
-    """Ridge regression from the positions and velocities of all points at one moment to theta, for each moment."""
+    """Ridge regression from positions at one moment, or from velocities too, to theta: one for each elapsed time.
 
-    can = frozenset({THETA_OF_BEGINNINGS})
+    Args:
+        points: "all", or the fingertip alone.
+        motion: "position", also "position and velocity", or "constant velocity": where the points would be at the mean
+            duration of the training.
+    """
+
+    can = frozenset({THETA, THETA_OF_BEGINNINGS})
+
+    def __init__(self, points: Literal["all", "fingertip"] = "all", motion: Motion = "position and velocity") -> None:
+        self.points, self.motion = points, motion
 
     def fit(self, examples: Examples) -> None:
         """Learn from movements of one action."""
-        self.examples, self.ridges = examples, dict[int, Any]()
+        self.examples, self.by_frames = examples, dict[int | None, Any]()
+        self.mean_frames = float(np.mean([len(x) for x in examples.sequences]))
+
+    def estimate(self, x: Floats) -> Estimate:
+        """From the last frames of complete movements, however long each is."""
+        return Estimate(self._predicted(x, None), None)
 
     def estimate_beginning(self, x: Floats) -> Floats:
         """What the regression for the time that has passed gives; movements that had ended stay at their end."""
-        linear_model, n = library("sklearn.linear_model", "scikit-learn"), len(x)
-        if n not in self.ridges:
-            rows = np.stack([_motion(one[:n]) for one in self.examples.sequences])
-            self.ridges[n] = linear_model.RidgeCV(alphas=FRAME_ALPHAS).fit(rows, self.examples.theta)
-        return np.asarray(self.ridges[n].predict(_motion(x)[None])[0])
+        return self._predicted(x, len(x))
 
+    def _predicted(self, x: Floats, frames: int | None) -> Floats:
+        if frames not in self.by_frames:
+            rows = np.stack([self._row(one[:frames]) for one in self.examples.sequences])
+            linear_model = library("sklearn.linear_model", "scikit-learn")
+            self.by_frames[frames] = linear_model.RidgeCV(alphas=FRAME_ALPHAS).fit(rows, self.examples.theta)
+        return np.asarray(self.by_frames[frames].predict(self._row(x)[None])[0])
 
-def _motion(x: Floats) -> Floats:
-    """Last frame and its mean velocity over at most six frames, per frame. Shape (2 D,)."""
-    before = x[max(0, len(x) - 1 - VELOCITY_FRAMES)]
-    return np.concatenate([x[-1], (x[-1] - before) / VELOCITY_FRAMES])
+    def _row(self, x: Floats) -> Floats:
+        """Last frame and its mean velocity over at most six frames, per frame, as far as they are wanted."""
+        tip = slice(3 * self.examples.tip, 3 * self.examples.tip + 3)
+        position: Floats = x[-1] if self.points == "all" else x[-1, tip]
+        before = x[max(0, len(x) - 1 - VELOCITY_FRAMES)]
+        velocity: Floats = ((x[-1] - before) if self.points == "all" else (x[-1] - before)[tip]) / VELOCITY_FRAMES
+        if self.motion == "constant velocity":
+            position = position + max(0.0, self.mean_frames - len(x)) * velocity
+        return position if self.motion != "position and velocity" else np.concatenate([position, velocity])
 
 
 class AlignedRidge(NotAble):

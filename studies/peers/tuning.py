@@ -6,9 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from paramove.documents import Floats
 from paramove.hmm import resample
+from studies.movements.measures import squared_deviations
 from studies.movements.method import CLASSES, FRAMES, SYNTHESIS, THETA, Estimate, Examples, Method, NotAble
 
 INNER_FOLDS = 3
@@ -33,8 +35,23 @@ class Tuned(NotAble):
         folds = inner_folds(examples)
         losses = [sum(self._loss(parameters, *fold) for fold in folds) for parameters in self.candidates]
         self.chosen = self.candidates[int(np.argmin(losses))]
+        self.inflation = self._inflation(folds)
         self.method = self.make(**self.chosen)
         self.method.fit(examples)
+
+    def _inflation(self, folds: Sequence[tuple[Examples, Examples]]) -> float:
+        """Factor on covariances of theta by which the 95 % regions hold as much of what the folds left out."""
+        squares = []
+        for train, test in folds if THETA in self.can else ():
+            method = self.make(**self.chosen)
+            method.fit(train)
+            for x, theta in _pairs(test):
+                estimate = method.estimate(x)
+                if estimate.covariance is not None:
+                    squares.append(squared_deviations(estimate.theta, estimate.covariance, theta))
+        level = chi2.ppf(0.95, folds[0][0].theta.shape[1])
+        known = [square for square in squares if np.isfinite(square)]
+        return float(np.quantile(known, 0.95) / level) if known else 1.0
 
     def _loss(self, parameters: dict[str, Any], train: Examples, test: Examples) -> float:
         method = self.make(**parameters)
@@ -60,8 +77,11 @@ class Tuned(NotAble):
         return self.method.synthesize(theta, n)
 
     def estimate(self, x: Floats) -> Estimate:
-        """By the chosen candidate."""
-        return self.method.estimate(x)
+        """By the chosen candidate, its covariance as wide as errors of what was left out."""
+        estimate = self.method.estimate(x)
+        if estimate.covariance is None:
+            return estimate
+        return estimate._replace(covariance=self.inflation * estimate.covariance)
 
     def classify(self, x: Floats, finished: bool) -> str:
         """By the chosen candidate."""

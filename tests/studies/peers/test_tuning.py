@@ -22,7 +22,9 @@ class Constant(NotAble):
 
 def examples(groups: int = 5) -> Examples:
     numbers = np.repeat(np.arange(groups), 2)
-    return Examples([np.full((20, 3), 2.0)] * len(numbers), numbers[:, None] * 1.0, ["a"] * len(numbers), numbers, 50.0)
+    return Examples(
+        [np.full((20, 3), 2.0)] * len(numbers), numbers[:, None] * 1.0, ["a"] * len(numbers), numbers, 50.0, 0
+    )
 
 
 def test_the_best_candidate_is_chosen_and_learns_everything() -> None:
