@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -28,8 +29,10 @@ class FrameProcess(NotAble):
         self.pca = library("sklearn.decomposition", "scikit-learn").PCA(count).fit(rows)
         z = self.pca.transform(rows)
         several = library("sklearn.multioutput", "scikit-learn").MultiOutputRegressor
-        self.movement_of_theta = several(_process(examples.theta.shape[1])).fit(examples.theta, z)
-        self.theta_of_movement = _process(count).fit(z, examples.theta)
+        with warnings.catch_warnings():  # of lengths at their bounds: a kernel that the data do not need
+            warnings.simplefilter("ignore", library("sklearn.exceptions", "scikit-learn").ConvergenceWarning)
+            self.movement_of_theta = several(_process(examples.theta.shape[1])).fit(examples.theta, z)
+            self.theta_of_movement = _process(count).fit(z, examples.theta)
 
     def synthesize(self, theta: Floats, n: int) -> Floats:
         """The means of the processes from theta."""
