@@ -271,27 +271,29 @@ def regions(out: Path) -> dict[str, Any]:
     found = []
     for name in ("few", "real"):
         for task, rows in load(out / f"{name}.json").items():
-            own, plain, ridge, moving = (
+            own, plain, ridge, moving, hand, last = (
                 {key: one["value"] for key, one in rows.get(row, {}).get("measures", {}).items()}
                 for row in (
                     "paramove, quadratic PHMM",
                     "paramove, quadratic PHMM as in the thesis",
                     "ridge from all frames",
                     "ridge from position and velocity",
+                    "ridge from the fingertip's position and velocity",
+                    "ridge from the fingertip's position",
                 )
             )
             if "covered_50" not in own:
                 continue
             factor, unit = (1.0, "°") if task.startswith("pointing") else (10.0, " mm")
-            theta, by_ridge = (f"{factor * one['theta']:.2f}{unit}" for one in (own, ridge))
-            after, moving_after = (
+            theta, by_ridge, at_end = (f"{factor * one['theta']:.2f}{unit}" for one in (own, ridge, last))
+            after, moving_after, hand_after = (
                 ", ".join(f"{factor * one[f'theta_{percent}']:.3g}" for percent in (25, 50, 75)) + unit
-                for one in (own, moving)
+                for one in (own, moving, hand)
             )
             keys = ("covered_50", "covered_80", "covered", "covered_set", "below_1", "below_5", "below_20")
             found.append(
                 {"task": task, "theta": theta, "ridge": by_ridge, "independent": plain.get("covered")}
-                | {"after": after, "moving_after": moving_after}
+                | {"at_end": at_end, "after": after, "moving_after": moving_after, "hand_after": hand_after}
                 | {key: own[key] for key in keys}
             )
     return {"tasks": found}
