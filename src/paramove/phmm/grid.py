@@ -107,10 +107,11 @@ class ParameterGrid:
         mesh = np.meshgrid(*self.knots, indexing="ij")
         return self.theta(np.stack([axis.ravel() for axis in mesh], axis=1))
 
-    def cell(self, position: Floats) -> Ints:
-        """The cell of coordinates (P,), outside that at the border: numbers of its lower grid lines, (P,)."""
-        lines = zip(self.knots, position, strict=True)
-        return np.array([np.searchsorted(knots[1:-1], at, side="right") for knots, at in lines], dtype=np.int64)
+    def cell(self, coordinates: Floats) -> Ints:
+        """The cell of coordinates (..., P), outside that at the border: numbers of its lower grid lines, (..., P)."""
+        lines = zip(self.knots, np.moveaxis(coordinates, -1, 0), strict=True)
+        found = [np.searchsorted(knots[1:-1], component, side="right") for knots, component in lines]
+        return np.stack(found, axis=-1).astype(np.int64)
 
     def regions(self, margin: float) -> Iterator[tuple[Floats, Floats]]:
         """Middle (P,) and bounds (P, 2) of cells, a single one in halves, and of the parts outside up to a margin."""
@@ -142,8 +143,7 @@ class ParameterGrid:
         positions = np.clip(coordinates, 0.0, 1.0) if clamped else coordinates
         indices = np.zeros((len(positions), 1), dtype=np.int64)
         weights = np.ones((len(positions), 1))
-        for component, knots in zip(positions.T, self.knots, strict=True):
-            cell = np.searchsorted(knots[1:-1], component, side="right")
+        for cell, component, knots in zip(self.cell(positions).T, positions.T, self.knots, strict=True):
             fraction = ((component - knots[cell]) / (knots[cell + 1] - knots[cell]))[:, None]
             lower = indices * len(knots) + cell[:, None]
             indices = np.concatenate([lower, lower + 1], axis=1)

@@ -119,29 +119,29 @@ def _squares(columns: Floats, n: int, out: Floats) -> None:
 @compiled
 def outputs_at(
     columns: Floats, ends: Ints, numbers: Ints, weights: Floats, clamped: Floats, means: Floats, covariances: Floats
-) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
-    """ln b_i(x_t) (N, T), Cholesky factors (N, D D), means (N, D), and whitened residuals (N, D, widest window)."""
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    """ln b_i(x_t) (N, T), Cholesky factors (N, D D), and whitened residuals (N, D, widest window)."""
     dim, n_frames = columns.shape
     n_states = means.shape[1]
     widest = 0
     for i in range(n_states):
         widest = max(widest, ends[i + 1, 1] - ends[i, 0])
     out = np.full((n_states, n_frames), -np.inf)
-    roots, centres = np.empty((n_states, dim * dim)), np.empty((n_states, dim))
+    roots, centre = np.empty((n_states, dim * dim)), np.empty(dim)
     white, squares = np.empty((n_states, dim, widest)), np.empty(widest)
     for i in range(n_states):
         begin, n = ends[i, 0], ends[i + 1, 1] - ends[i, 0]
-        _weighted(means, numbers, weights, i, centres[i])
+        _weighted(means, numbers, weights, i, centre)
         _weighted(covariances, numbers, clamped, i, roots[i])
         log_norm = -0.5 * dim * LOG_2PI - _factorised(roots[i], dim)
         for k in range(dim):
             for f in range(n):
-                white[i, k, f] = columns[k, begin + f] - centres[i, k]
+                white[i, k, f] = columns[k, begin + f] - centre[k]
         _forward_substituted(roots[i], dim, n, white[i])
         _squares(white[i], n, squares)
         for f in range(n):
             out[i, begin + f] = log_norm - 0.5 * squares[f]
-    return out, roots, centres, white
+    return out, roots, white
 
 
 @compiled
@@ -154,7 +154,7 @@ def value_at(
     numbers = corner_numbers(cell, counts)
     weights, _ = corner_weights(u, cell, knots, False)
     clamped, _ = corner_weights(u, cell, knots, True)
-    out, _, _, _ = outputs_at(columns, ends, numbers, weights, clamped, means, covariances)
+    out, _, _ = outputs_at(columns, ends, numbers, weights, clamped, means, covariances)
     value, _, _ = _segments(out, _log_durations(durations, numbers, clamped), d_min)
     return value
 
@@ -192,7 +192,7 @@ def expectation_at(
     numbers = corner_numbers(cell, counts)
     weights, slopes = corner_weights(u, cell, knots, False)
     clamped, clamped_slopes = corner_weights(u, cell, knots, True)
-    out, roots, _, white = outputs_at(columns, ends, numbers, weights, clamped, means, covariances)
+    out, roots, white = outputs_at(columns, ends, numbers, weights, clamped, means, covariances)
     log_duration = _log_durations(durations, numbers, clamped)
     value, gamma, counted = _segments(out, log_duration, d_min)
     gradient, information = np.zeros(dimension), np.zeros((dimension, dimension))
