@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from itertools import product
+from operator import call
 from typing import Any
 
 from studies.movements.method import BEGINNINGS, CLASSES, Method
@@ -72,34 +73,30 @@ def ridge_rows() -> list[Row]:
     candidates = grid_of(components=[4, 8, 16], degree=[1, 2])
     rest = (AlignedRidge, candidates, ("tslearn", "scikit-learn"))
     return [
-        Row("ridge from all frames", lambda seed: FrameRidge(), "", ("scikit-learn",)),
-        *(Row(name, partial(_moving, *parameters), repr(parameters), ("scikit-learn",)) for name, parameters in MOVING),
+        Row("ridge from all frames", _seedless(FrameRidge), "", ("scikit-learn",)),
+        *(Row(name, _seedless(partial(MotionRidge, *of)), repr(of), ("scikit-learn",)) for name, of in MOVING.items()),
         *both("DTW + PCA + quadratic ridge, diagonal", *rest),
         *both("DTW + PCA + quadratic ridge, full covariance", *rest, covariance="full"),
         *both("PCA + quadratic ridge, full covariance", *rest, covariance="full", warped=False),
     ]
 
 
-MOVING: list[tuple[str, tuple[Any, Any]]] = [
-    ("ridge from position and velocity", ("all", "position and velocity")),
-    ("ridge from the fingertip's position", ("fingertip", "position")),
-    ("ridge from the fingertip's position and velocity", ("fingertip", "position and velocity")),
-    ("ridge from the fingertip at constant velocity", ("fingertip", "constant velocity")),
-]
+MOVING: dict[str, tuple[Any, Any]] = {
+    "ridge from position and velocity": ("all", "position and velocity"),
+    "ridge from the fingertip's position": ("fingertip", "position"),
+    "ridge from the fingertip's position and velocity": ("fingertip", "position and velocity"),
+    "ridge from the fingertip at constant velocity": ("fingertip", "constant velocity"),
+}
 
 
-def _moving(points: Any, motion: Any, seed: int) -> Method:
-    return MotionRidge(points, motion)
+def _seedless(make: Callable[[], Method]) -> Callable[[int], Method]:
+    return lambda seed: make()
 
 
 def gaussian_process_rows() -> list[Row]:
     """Gaussian processes on resampled frames."""
     candidates = grid_of(components=[4, 8, 16])
-    return both("Gaussian processes", FrameProcess, candidates, ("scikit-learn",), whole=_only)
-
-
-def _only(make_one: Callable[[], Method]) -> Method:
-    return make_one()
+    return both("Gaussian processes", FrameProcess, candidates, ("scikit-learn",), whole=call)
 
 
 def promp_rows() -> list[Row]:

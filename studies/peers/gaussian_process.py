@@ -26,7 +26,7 @@ class FrameProcess(NotAble):
         rows = np.stack([resample(x, FRAMES).ravel() for x in examples.sequences])
         self.dim = examples.sequences[0].shape[1]
         count = min(self.components, len(rows) - 1)
-        self.pca = library("sklearn.decomposition", "scikit-learn").PCA(count).fit(rows)
+        self.pca = library("sklearn.decomposition", "scikit-learn").PCA(count, random_state=0).fit(rows)
         z = self.pca.transform(rows)
         several = library("sklearn.multioutput", "scikit-learn").MultiOutputRegressor
         with warnings.catch_warnings():  # of lengths at their bounds: a kernel that the data do not need

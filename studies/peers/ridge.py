@@ -79,13 +79,14 @@ class MotionRidge(NotAble):
 
     def _row(self, x: Floats) -> Floats:
         """Last frame and its mean velocity over at most six frames, per frame, as far as they are wanted."""
-        tip = slice(3 * self.examples.tip, 3 * self.examples.tip + 3)
-        position: Floats = x[-1] if self.points == "all" else x[-1, tip]
-        before = x[max(0, len(x) - 1 - VELOCITY_FRAMES)]
-        velocity: Floats = ((x[-1] - before) if self.points == "all" else (x[-1] - before)[tip]) / VELOCITY_FRAMES
-        if self.motion == "constant velocity":
-            position = position + max(0.0, self.mean_frames - len(x)) * velocity
-        return position if self.motion != "position and velocity" else np.concatenate([position, velocity])
+        tip = 3 * self.examples.tip
+        own = x if self.points == "all" else x[:, tip : tip + 3]
+        position, velocity = own[-1], (own[-1] - own[max(0, len(x) - 1 - VELOCITY_FRAMES)]) / VELOCITY_FRAMES
+        if self.motion == "position and velocity":
+            return np.concatenate([position, velocity])
+        remaining = max(0.0, self.mean_frames - len(x)) if self.motion == "constant velocity" else 0.0
+        result: Floats = position + remaining * velocity
+        return result
 
 
 class AlignedRidge(NotAble):
@@ -117,7 +118,7 @@ class AlignedRidge(NotAble):
         rows = np.stack([self._row(x) for x in resampled])
         self.dim = resampled[0].shape[1]
         n_components = min(self.components, len(rows) - 1)
-        self.pca = decomposition.PCA(n_components).fit(rows)
+        self.pca = decomposition.PCA(n_components, random_state=0).fit(rows)
         z = self.pca.transform(rows)
         self.features = QuadraticFeatures.of(examples.theta, self.degree)
         self.ridge = linear_model.RidgeCV(alphas=ALPHAS).fit(self.features(examples.theta), z)

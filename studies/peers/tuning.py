@@ -33,44 +33,37 @@ class Tuned(NotAble):
     def fit(self, examples: Examples) -> None:
         """Choose, then learn from all examples."""
         folds = inner_folds(examples)
-        losses = [sum(self._loss(parameters, *fold) for fold in folds) for parameters in self.candidates]
-        self.chosen = self.candidates[int(np.argmin(losses))]
-        self.inflation = self._inflation(folds)
+        tested = [[self._tested(parameters, *fold) for fold in folds] for parameters in self.candidates]
+        best = int(np.argmin([sum(loss for loss, _ in own) for own in tested]))
+        self.chosen = self.candidates[best]
+        self.inflation = inflation_of([square for _, squares in tested[best] for square in squares], examples)
         self.method = self.make(**self.chosen)
         self.method.fit(examples)
 
-    def _inflation(self, folds: Sequence[tuple[Examples, Examples]]) -> float:
-        """Factor on covariances of theta by which the 95 % regions hold as much of what the folds left out."""
-        squares = []
-        for train, test in folds if THETA in self.can else ():
-            method = self.make(**self.chosen)
-            method.fit(train)
-            for x, theta in _pairs(test):
-                estimate = method.estimate(x)
-                if estimate.covariance is not None:
-                    squares.append(squared_deviations(estimate.theta, estimate.covariance, theta))
-        level = chi2.ppf(0.95, folds[0][0].theta.shape[1])
-        known = [square for square in squares if np.isfinite(square)]
-        return float(np.quantile(known, 0.95) / level) if known else 1.0
-
-    def _loss(self, parameters: dict[str, Any], train: Examples, test: Examples) -> float:
+    def _tested(self, parameters: dict[str, Any], train: Examples, test: Examples) -> tuple[float, list[float]]:
+        """Loss on a fold, and the squared errors of theta in predicted deviations, if it predicts any."""
         method = self.make(**parameters)
         method.fit(train)
         if len(train.actions) > 1:
             if CLASSES not in method.can:
-                return 0.0
-            return -float(
-                np.mean([method.classify(x, True) == a for x, a in zip(test.sequences, test.labels, strict=True)])
-            )
-        loss = 0.0
+                return 0.0, []
+            right = [method.classify(x, True) == a for x, a in zip(test.sequences, test.labels, strict=True)]
+            return -float(np.mean(right)), []
+        loss, squares = 0.0, []
         if THETA in method.can:
             deviation = np.maximum(train.theta.std(axis=0), 1e-9)
-            errors = [(method.estimate(x).theta - theta) / deviation for x, theta in _pairs(test)]
+            estimates = [(method.estimate(x), theta) for x, theta in _pairs(test)]
+            errors = [(estimate.theta - theta) / deviation for estimate, theta in estimates]
             loss += float(np.log(np.mean(np.linalg.norm(errors, axis=1))))
+            squares = [
+                squared_deviations(estimate.theta, estimate.covariance, theta)
+                for estimate, theta in estimates
+                if estimate.covariance is not None
+            ]
         if SYNTHESIS in method.can:
             off = [((method.synthesize(theta, FRAMES) - resample(x, FRAMES)) ** 2).mean() for x, theta in _pairs(test)]
             loss += 0.5 * float(np.log(np.mean(off)))
-        return loss
+        return loss, squares
 
     def synthesize(self, theta: Floats, n: int) -> Floats:
         """By the chosen candidate."""
@@ -105,6 +98,12 @@ def inner_folds(examples: Examples) -> list[tuple[Examples, Examples]]:
         step = max(1, len(tested) // MAX_TESTED)
         folds.append((examples.chosen(~left_out), examples.chosen(tested[::step])))
     return folds
+
+
+def inflation_of(squares: Sequence[float], examples: Examples) -> float:
+    """Factor on covariances of theta by which the 95 % regions hold as much of what the folds left out."""
+    known = [square for square in squares if np.isfinite(square)]
+    return float(np.quantile(known, 0.95) / chi2.ppf(0.95, examples.theta.shape[1])) if known else 1.0
 
 
 def _pairs(examples: Examples) -> list[tuple[Floats, Floats]]:

@@ -10,6 +10,8 @@ from studies.peers.catalogue import peer_rows
 from studies.peers.library import PeerMissingError, library
 
 DEFAULTS = [row for row in peer_rows() if row.name.endswith("(default)")]
+REGRESSIONS = {"Gaussian processes (default)"}
+"""They score no movements, so they are no classifiers."""
 
 
 def bows(action: str, rng: np.random.Generator, *, groups: int = 9, repetitions: int = 4) -> Examples:
@@ -69,8 +71,9 @@ def test_two_actions(row: Row) -> None:
         50.0,
         0,
     )
-    if CLASSES not in method.can:
-        pytest.skip("is no classifier")
+    assert (CLASSES in method.can) == (row.name not in REGRESSIONS)
+    if row.name in REGRESSIONS:
+        return
     method.fit(both)
     for action in ("over", "under"):
         (x,) = bows(action, np.random.default_rng(9), groups=1, repetitions=1).sequences
