@@ -168,7 +168,7 @@ def test_files_that_do_not_fit_are_refused(
     broken.write_bytes(content[: len(content) // 2])
     rejected("cut off or damaged")
     np.savez(broken, **{**arrays, "format_version": np.array(99)})
-    rejected("expected format version 2, found 99")
+    rejected("expected format version 3, found 99")
     np.savez(broken, **{**arrays, "learned_durations": np.full_like(arrays["learned_durations"], np.nan)})
     rejected("expected finite numbers in 'durations', found NaN")
     np.savez(broken, **{name: value for name, value in arrays.items() if name != "learned_covariances"})

@@ -106,7 +106,7 @@ def test_file_gives_the_same_model(model: InterpolativePHMM, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("format_version", np.array(7), "expected format version 2, found 7"),
+        ("format_version", np.array(7), "expected format version 3, found 7"),
         ("learned_means", np.full((6, 20, 4), np.nan), "expected finite numbers in 'means', found NaN"),
         ("learned_means", np.zeros((6, 19, 4)), r"expected means of shape \(6, 20, 4\), found \(6, 19, 4\)"),
         ("header", np.array('{"class": "Other", "parameters": {}, "training": null}'), "found a Other"),

@@ -143,7 +143,7 @@ def _cut(name: str, shape: tuple[int, ...]) -> Callable[[Path], Content]:
 
 
 WRONG: Mapping[str, tuple[Callable[[Path], Content], str]] = {
-    "older": (lambda _: {"format_version": np.array(1)}, "expected format version 2, found 1; train the model again"),
+    "older": (lambda _: {"format_version": np.array(1)}, "expected format version 3, found 1; train the model again"),
     "version in words": (lambda _: {"format_version": np.array("one")}, "expected a whole number as format version"),
     "versions": (lambda _: {"format_version": np.array([1, 1])}, "expected a whole number as format version"),
     "class": (lambda f: {"header": _header(f, **{"class": "Wave"})}, r"expected one of \[.*\], found a Wave"),

@@ -70,7 +70,10 @@ class Beginnings:
             numbers: Sequence[int], increments: bool, shrinkages: tuple[float, ...]
         ) -> list[tuple[CorrelatedRegression, float]]:
             ys = [described(points[:, number], increments) for number in numbers]
-            return CorrelatedRegression.several_with_errors(ys, theta, monomials, groups, ridge, shrinkages)
+            end = np.tile(np.eye(points.shape[3]), (POINTS, 1))
+            if not increments:
+                end[: -points.shape[3]] = 0.0
+            return CorrelatedRegression.several_with_errors(ys, theta, monomials, groups, ridge, shrinkages, end)
 
         compared = {increments: of(COMPARED, increments, SHRINKAGES) for increments in (True, False)}
         error = {increments: sum(np.log(one) for _, one in results) for increments, results in compared.items()}
@@ -113,8 +116,8 @@ class Beginnings:
             regressions = tuple(one.widened(added) for one in regressions)
             condensed = CondensedRegressions.of(regressions)
         y = points_of(sequence, self.increments)[None]
-        theta, covariances = condensed.estimates(y, min(margin, WIDEST_MARGIN))
-        distances = condensed.distances_from(y, theta)
+        theta, covariances, nearest = condensed.estimates(y, min(margin, WIDEST_MARGIN))
+        distances = condensed.distances_from(y, nearest)
         prior = np.diag((PRIOR_WIDTH * condensed.monomials.scale) ** -2.0)
         covariances = np.linalg.inv(np.linalg.inv(covariances) + prior).astype(np.float64)
         theta -= ((theta - condensed.monomials.centre)[:, None] @ prior @ covariances)[:, 0]

@@ -22,7 +22,8 @@ from scipy.linalg import solve_triangular
 from paramove.documents import Floats, Ints
 from paramove.phmm.adaptation import WITHIN, Adaptation
 from paramove.phmm.features import Monomials
-from paramove.phmm.left_out import folds_of, inflation_of, one_theta_each
+from paramove.phmm.inverse_regression import InverseRegression
+from paramove.phmm.left_out import LeftOut, folds_of, inflation_of, one_theta_each
 from paramove.phmm.noise import distances_with_noise
 from paramove.phmm.predictive_distribution import PredictiveDistribution
 from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out, studentised_residuals
@@ -35,6 +36,8 @@ MARGIN = 1.0
 """How far outside the bounds of the training left-out movements may lie, as a fraction of the width of theta."""
 UNSEEN_CURVATURE = 0.045
 """Deviation of scaled theta by each coefficient above degree 1 that no theta of the training determines."""
+KNOWN = 0.5
+"""Deviation with which movements determine such a coefficient, in units of their left-out errors: V has a part too."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,7 @@ class CorrelatedRegression:
         distances: squared Mahalanobis distances of training movements, each left out, in their order. Shape (K,).
         groups: number of the group of each, shape (K,).
         ridge: per degree above 0. shrinkage: of the correlations.
+        inverse: what is stacked with theta of the model; None: nothing is.
     """
 
     monomials: Monomials
@@ -63,6 +67,7 @@ class CorrelatedRegression:
     groups: Ints
     ridge: tuple[float, ...]
     shrinkage: float
+    inverse: InverseRegression | None = None
 
     @classmethod
     def fitted(
@@ -86,10 +91,12 @@ class CorrelatedRegression:
         groups: Ints,
         ridge: tuple[float, ...] | None = None,
         shrinkages: tuple[float, ...] = SHRINKAGES,
+        end: Floats | None = None,
     ) -> list[tuple[CorrelatedRegression, float]]:
         """Of several descriptions (K, n) of the same movements; what depends on theta alone is computed once.
 
-        And for each the mean error of scaled theta of left-out groups, infinite if no group could be left out.
+        And for each the mean error of scaled theta of left-out groups, infinite if no group could be left out. The last
+        frame of a movement y is y @ end, `end` of shape (n, D); with it an inverse regression is stacked.
         """
         features, one_each = monomials.at(theta), one_theta_each(theta, groups)
         # Single movements are left out where a theta that was left out could not be predicted.
@@ -116,14 +123,23 @@ class CorrelatedRegression:
             shrinkage = _chosen_shrinkage(own[0], y, theta, shrinkages)
             regression = everything.regression(groups, chosen, shrinkage)
             tests = [_left_out(one, y, theta, groups, (chosen, shrinkage)) for one in own]
-            errors, distances = tests[0][0], tests[-1][2]
-            inflation = inflation_of([one[1][np.isfinite(one[1])] for one in tests], theta.shape[1], n_persons)
+            inverse, distances = None, tests[-1].distances
+            if end is not None and own[0]:
+                tested = [[numbers for numbers, _ in way] for way in own]
+                inverse, tests = InverseRegression.stacked(y, end, theta, list(zip(tested, tests, strict=True)))
+            inflation = inflation_of([one.squares for one in tests], theta.shape[1], n_persons)
             # Movements that no fold tested are compared with a covariance that includes them.
             untested = np.isnan(distances)
             if untested.any():
                 distances[untested] = regression.distances_from(y[untested], theta[untested])
+            errors = np.linalg.norm(tests[0].missed / monomials.scale, axis=1)
+            unseen = regression.unseen
+            if own[0]:
+                deviation = float(np.sqrt(np.nanmean(errors**2) / theta.shape[1]))
+                unseen = unseen_curvature(features, monomials.degrees, KNOWN * deviation)
             error = float(np.nanmean(errors)) if own[0] and not few else np.inf
-            results.append((replace(regression, inflation=inflation, distances=distances), error))
+            regression = replace(regression, inflation=inflation, distances=distances, inverse=inverse, unseen=unseen)
+            results.append((regression, error))
         return results
 
     def estimate(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
@@ -146,7 +162,7 @@ class CorrelatedRegression:
     def estimates(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
         """`estimate` of many movements (K, n): theta (K, P) and covariances (K, P, P)."""
         self._check_length(y[0])
-        return self.condensed.estimates(y, margin)
+        return self.condensed.estimates(y, margin)[:2]
 
     def distances_from(self, y: Floats, theta: Floats) -> Floats:
         """`distance` of many movements (K, n) from those of theta (K, P). Shape (K,)."""
@@ -161,6 +177,7 @@ class CorrelatedRegression:
             coefficients=self.coefficients + adaptation.change(missed),
             uncertainty=adaptation.remaining(self.uncertainty) / WITHIN,
             root=np.sqrt(WITHIN) * self.root,
+            inverse=self.inverse and self.inverse.adapted(y, theta, adaptation),
         )
 
     def widened(self, covariance: Floats) -> CorrelatedRegression:
@@ -168,7 +185,9 @@ class CorrelatedRegression:
         own = self.root @ self.root.T
         moments = own if self.shrinkage >= 1.0 else own - self.shrinkage * np.diag(np.diagonal(own))
         distances = distances_with_noise(self.distances, own, moments, covariance)
-        return replace(self, root=np.linalg.cholesky(own + covariance).astype(np.float64), distances=distances)
+        root = np.linalg.cholesky(own + covariance).astype(np.float64)
+        inverse = self.inverse and self.inverse.widened(covariance)
+        return replace(self, root=root, distances=distances, inverse=inverse)
 
     def log_density(self, distance: float) -> float:
         """Logarithm of the density of a movement at a `distance`."""
@@ -195,7 +214,7 @@ class CorrelatedRegression:
             "coefficients": self.coefficients, "uncertainty": self.uncertainty, "unseen": self.unseen,
             "root": self.root,
             "distances": self.distances, "groups": self.groups.astype(np.float64), "scalars": scalars,
-        }  # fmt: skip
+        } | ({} if self.inverse is None else {"inverse": self.inverse.array()})  # fmt: skip
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, Floats], prefix: str, monomials: Monomials) -> CorrelatedRegression:
@@ -214,9 +233,11 @@ class CorrelatedRegression:
         if not (np.diagonal(own["root"]) > 0).all() or scalars.ndim != 1 or len(scalars) < 3 or not scalars[0] > 0:
             raise ValueError(f"expected a root with a positive diagonal and an inflation above 0 in {prefix}scalars")
         inflation, shrinkage, *ridge = (float(one) for one in scalars)
+        inverse = arrays.get(f"{prefix}inverse")
         return cls(
             monomials, own["coefficients"], own["uncertainty"], own["unseen"], own["root"], inflation,
             own["distances"], own["groups"].astype(np.int64), tuple(ridge), shrinkage,
+            None if inverse is None else InverseRegression.from_array(inverse, count, len(monomials.centre)),
         )  # fmt: skip
 
     def _check_length(self, y: Floats) -> None:
@@ -238,11 +259,13 @@ class CondensedRegressions:
 
     Attributes:
         monomials: of all of them.
+        inverse: of all, with R in front of the shapes, or None.
         inverses: L^-1, (R, n, n). white: L^-1 Z, (R, n, F). projectors: Q' L^-1, (R, F, n). triangles: R, (R, F, F).
         uncertainty: V, (R, F, F). unseen: W, (R, F, F). inflation: (R,). log_norms: of the density at distance 0, (R,).
     """
 
     monomials: Monomials
+    inverse: InverseRegression | None
     inverses: Floats
     white: Floats
     projectors: Floats
@@ -260,7 +283,8 @@ class CondensedRegressions:
         white = inverses @ np.stack([one.coefficients for one in regressions])
         bases, triangles = np.linalg.qr(white)
         return cls(
-            regressions[0].monomials, inverses, white, np.swapaxes(bases, 1, 2) @ inverses,
+            regressions[0].monomials, InverseRegression.together([one.inverse for one in regressions]),
+            inverses, white, np.swapaxes(bases, 1, 2) @ inverses,
             np.ascontiguousarray(triangles), np.stack([one.uncertainty for one in regressions]),
             np.stack([one.unseen for one in regressions]),
             np.array([one.inflation for one in regressions]), np.array([one.log_density(0.0) for one in regressions]),
@@ -268,22 +292,30 @@ class CondensedRegressions:
 
     def part(self, chosen: slice) -> CondensedRegressions:
         """Some of them."""
-        everything = [getattr(self, field.name) for field in fields(self)]
-        return CondensedRegressions(everything[0], *(one[chosen] for one in everything[1:]))
+        monomials, inverse, *others = (getattr(self, field.name) for field in fields(self))
+        return CondensedRegressions(monomials, inverse and inverse.part(chosen), *(one[chosen] for one in others))
 
-    def estimates(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
-        """Of movements (K, n) theta (K, P) and its covariances (K, P, P), see `CorrelatedRegression.estimate`."""
+    def estimates(self, y: Floats, margin: float) -> tuple[Floats, Floats, Floats]:
+        """Of movements (K, n) theta (K, P) and its covariances (K, P, P), see `CorrelatedRegression.estimate`.
+
+        And theta that explains each movement best, (K, P), from which distances count.
+        """
         own, bound = self.monomials, 1.0 + 2.0 * margin
         condensed = (self.projectors @ y[..., None])[..., 0]
         positions, slopes = all_nearest(
             own.starts, bound, own.exponents, own.logistic, condensed, self.triangles, NEWTON_STEPS
         )
-        theta: Floats = own.centre + own.scale * positions
-        phi, widest = own.at(theta), np.eye(len(own.scale))
+        nearest: Floats = own.centre + own.scale * positions
+        phi, squares = own.at(nearest), np.diag(own.scale**2)
         information = np.swapaxes(slopes, 1, 2) @ slopes / variances_at(phi, self.uncertainty)[:, None, None]
-        covariances = self.inflation[:, None, None] * np.linalg.inv(information + widest / bound**2)
-        covariances += (variances_at(phi, self.unseen) - 1.0)[:, None, None] * widest
-        return theta, covariances * (own.scale[:, None] * own.scale)
+        covariances = np.linalg.inv(information + np.eye(len(squares)) / bound**2)
+        covariances, theta = covariances * (own.scale[:, None] * own.scale), nearest
+        if self.inverse is not None:
+            theta, covariances = self.inverse.combined(y, nearest, covariances)
+            theta = np.clip(theta, own.centre - bound * own.scale, own.centre + bound * own.scale)
+        covariances = self.inflation[:, None, None] * covariances
+        covariances += (variances_at(phi, self.unseen) - 1.0)[:, None, None] * squares
+        return theta, covariances, nearest
 
     def distances_from(self, y: Floats, theta: Floats) -> Floats:
         """Of movements (K, n) from those of theta (K, P), see `CorrelatedRegression.distance`. Shape (K,)."""
@@ -312,7 +344,7 @@ class _Fit:
         """One of each description; `one_each`: groups are those of one theta, not of one person, who has habits."""
         penalty = penalties(ridge, monomials.degrees, len(features))
         uncertainty = np.linalg.inv(features.T @ features + penalty).astype(np.float64)
-        unseen, gain = unseen_curvature(features, monomials.degrees), uncertainty @ features.T
+        unseen, gain = unseen_curvature(features, monomials.degrees, 0.0), uncertainty @ features.T
         rescaled = (studentised_residuals if one_each else residuals_left_out)(
             np.concatenate(ys, axis=1), features, penalty, groups
         )
@@ -336,17 +368,15 @@ class _Fit:
 def _left_out(
     folds: Sequence[tuple[Ints, _Fit]], y: Floats, theta: Floats, groups: Ints,
     chosen: tuple[tuple[float, ...], float],
-) -> Floats:  # fmt: skip
-    """Error of scaled theta, the same squared in predicted deviations, and distance, of each movement. (3, K)."""
-    results = np.full((3, len(y)), np.nan)
+) -> LeftOut:  # fmt: skip
+    count, dimension = theta.shape
+    found = LeftOut(*(np.full((count, *shape), np.nan) for shape in ((dimension,), (dimension, dimension), ())))
     for tested, fit in folds:
         other = fit.regression(groups[tested], *chosen)
-        found, covariances = other.estimates(y[tested], MARGIN)
-        missed = found - theta[tested]
-        results[0, tested] = np.linalg.norm(missed / other.monomials.scale, axis=1)
-        results[1, tested] = (missed * np.linalg.solve(covariances, missed[..., None])[..., 0]).sum(axis=1)
-        results[2, tested] = other.distances_from(y[tested], found)
-    return results
+        theta_found, found.covariances[tested] = other.estimates(y[tested], MARGIN)
+        found.missed[tested] = theta_found - theta[tested]
+        found.distances[tested] = other.distances_from(y[tested], theta_found)
+    return found
 
 
 def _chosen_shrinkage(folds: list[tuple[Ints, _Fit]], y: Floats, theta: Floats, candidates: tuple[float, ...]) -> float:
@@ -387,15 +417,15 @@ def variances_at(phi: Floats, uncertainty: Floats) -> Floats:
     return result
 
 
-def unseen_curvature(features: Floats, degrees: Ints) -> Floats:
+def unseen_curvature(features: Floats, degrees: Ints, deviation: float) -> Floats:
     """Covariance of scaled theta by coefficients of degrees above 1 that features (K, F) do not determine. (F, F).
 
     Between the four corners of a square, nothing shows whether a movement curves; neither residuals nor left-out
-    corners do. Such coefficients have a prior deviation.
+    corners do. Such coefficients have a prior deviation; movements determine them with errors of a `deviation`.
     """
     precision = np.diag(np.where(degrees > 1, UNSEEN_CURVATURE**-2.0, 1.0))
-    known = features.T @ features / (1e-6 * UNSEEN_CURVATURE**2 * len(features))
-    return np.linalg.inv(known + precision).astype(np.float64)
+    variance = deviation**2 + 1e-6 * UNSEEN_CURVATURE**2 * len(features)
+    return np.linalg.inv(features.T @ features / variance + precision).astype(np.float64)
 
 
 def shrunk(moments: Floats, shrinkage: float) -> Floats:

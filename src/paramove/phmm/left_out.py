@@ -1,6 +1,7 @@
 """Folds of cross-validation over groups, and inflation of covariances of theta by errors of left-out movements."""
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import chdtri  # scipy.stats would take half a second to import
@@ -8,6 +9,27 @@ from scipy.special import chdtri  # scipy.stats would take half a second to impo
 from paramove.documents import Floats, Ints
 
 MAX_FOLDS = 10
+
+
+class LeftOut(NamedTuple):
+    """What models of other movements find for each of K movements; NaN where it was in no fold.
+
+    Attributes:
+        missed: errors of theta, shape (K, P).
+        covariances: those predicted for it, shape (K, P, P).
+        distances: of the movement from the model, shape (K,).
+    """
+
+    missed: Floats
+    covariances: Floats
+    distances: Floats
+
+    @property
+    def squares(self) -> Floats:
+        """Squared errors in predicted deviations, of the movements in a fold."""
+        missed, covariances = (one[np.isfinite(self.distances)] for one in (self.missed, self.covariances))
+        result: Floats = (missed * np.linalg.solve(covariances, missed[..., None])[..., 0]).sum(axis=1)
+        return result
 
 
 def folds_of(groups: Ints, least: int = 3) -> Iterator[tuple[Ints, Ints]]:

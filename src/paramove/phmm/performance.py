@@ -22,8 +22,6 @@ from paramove.phmm.predictive_distribution import PredictiveDistribution
 
 PARTS, PART_FRAMES = 5, 20
 """A complete movement is described by the means of its fifths, of 20 interpolated frames each, and its last frame."""
-LATE_ROWS = 2
-"""Rows of that description that alone may predict theta better: of movements that end at their target."""
 OUTLIER_SHRINKAGE = 0.5
 """What estimates theta best may take nearly all correlations for chance; then movements of another kind pass."""
 PACE_PARTS, PACE_SHRINKAGE, PACE_WEIGHT = 10, 0.1, 0.35
@@ -84,7 +82,7 @@ class Performances:
 
     Attributes:
         complete: of `movement_parts`, for outliers.
-        estimating: of all or the last rows of that, whichever predicts theta of left-out groups better.
+        estimating: the same, for theta.
         beginnings: of movements that go on.
         pace: of complete movements.
         noise: beyond that of the training that is expected of sequences.
@@ -100,36 +98,35 @@ class Performances:
     def fitted(cls, sequences: Sequence[Floats], theta: Floats, monomials: Monomials, groups: Ints) -> Performances:
         """From movements as recorded, in their own time."""
         parts = np.stack([movement_parts(sequence) for sequence in sequences])
-        last = parts[:, -LATE_ROWS * sequences[0].shape[1] :]
+        end = np.eye(parts.shape[1])[:, -sequences[0].shape[1] :]
         complete = CorrelatedRegression.fitted(parts, theta, monomials, groups, shrinkages=(OUTLIER_SHRINKAGE,))
-        fitted = CorrelatedRegression.several_with_errors
-        ((estimating, error),) = fitted([parts], theta, monomials, groups, complete.ridge)
-        ((late, late_error),) = fitted([last], theta, monomials, groups)
+        ((estimating, _),) = CorrelatedRegression.several_with_errors(
+            [parts], theta, monomials, groups, complete.ridge, end=end
+        )
         beginnings = Beginnings.fitted(sequences, theta, monomials, groups, complete.ridge)
         pace = Pace.fitted(sequences, groups)
-        return cls(complete, beginnings, pace, late if late_error < error else estimating)
+        return cls(complete, beginnings, pace, estimating)
 
     def adapted(self, sequences: Sequence[Floats], theta: Floats, adaptation: Adaptation) -> Performances:
         """Of the person whose movements at theta (K, P) these are."""
-        parts, n_last = np.stack([movement_parts(sequence) for sequence in sequences]), len(self.estimating.root)
+        parts = np.stack([movement_parts(sequence) for sequence in sequences])
         return replace(
             self,
             complete=self.complete.adapted(parts, theta, adaptation),
-            estimating=self.estimating.adapted(parts[:, -n_last:], theta, adaptation),
+            estimating=self.estimating.adapted(parts, theta, adaptation),
             beginnings=self.beginnings.adapted(sequences, theta, adaptation),
         )
 
     def expecting(self, noise: AddedNoise) -> Performances:
         """The same for a sequence with noise."""
         of_parts = noise.of_averages(movement_parts)
-        pace, n_last = self.pace.expecting(noise.variance, noise.sequence), len(self.estimating.coefficients)
-        estimating = self.estimating.widened(of_parts[-n_last:, -n_last:])
-        complete = self.complete.widened(of_parts)
+        pace = self.pace.expecting(noise.variance, noise.sequence)
+        complete, estimating = self.complete.widened(of_parts), self.estimating.widened(of_parts)
         return replace(self, complete=complete, pace=pace, estimating=estimating, noise=noise)
 
     def estimate(self, parts: Floats, margin: float) -> tuple[Floats, Floats]:
         """Theta (P,) and its covariance (P, P) of a complete movement, from its `movement_parts`."""
-        return self.estimating.estimate(parts[-len(self.estimating.coefficients) :], margin)
+        return self.estimating.estimate(parts, margin)
 
     def outlier_score(self, distance: float, pace_distance: float) -> float:
         """Distance of a complete movement from the training; about 1.3 for genuine ones.
@@ -170,10 +167,10 @@ class Performances:
         """From the result of `arrays`. Raises KeyError for a missing array, ValueError for shapes that do not fit."""
         complete = CorrelatedRegression.from_arrays(arrays, "complete_", monomials)
         estimating = CorrelatedRegression.from_arrays(arrays, "estimating_", monomials)
-        if len(estimating.coefficients) > len(complete.coefficients):
+        if estimating.coefficients.shape != complete.coefficients.shape:
             raise ValueError(
-                f"expected estimating_coefficients of at most {len(complete.coefficients)} rows, found "
-                f"{len(estimating.coefficients)}"
+                f"expected estimating_coefficients of shape {complete.coefficients.shape}, found "
+                f"{estimating.coefficients.shape}"
             )
         beginnings = Beginnings.from_arrays(arrays, monomials)
         pace = Pace(arrays["pace_mean"], arrays["pace_root"], arrays["pace_distances"])

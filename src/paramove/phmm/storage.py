@@ -13,11 +13,11 @@ from paramove.documents import Floats, InputError, read_arrays, replacing
 from paramove.hmm import TrainingOptions, TrainingSummary
 from paramove.phmm.description import MovementDescription
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 MAX_BYTES = 256 * 2**20
 """Of all arrays together; the reaching model of 8 local models has 8 MB."""
 MAX_ARRAYS = 500
-"""Each of the twenty fractions of unfinished movements has seven."""
+"""Each of the twenty fractions of unfinished movements has eight."""
 MAX_LETTERS = 100_000
 """Maximum of the header; that of a model with a description has 1 000."""
 
