@@ -19,7 +19,7 @@ def movements(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fitted(y: np.ndarray, theta: np.ndarray, groups: np.ndarray) -> CorrelatedRegression:
-    return CorrelatedRegression.fitted(y, theta, Monomials.of_degree(1, theta), groups)
+    return CorrelatedRegression.fitted_with_errors([y], theta, Monomials.of_degree(1, theta), groups)[0][0]
 
 
 @pytest.mark.parametrize("n_groups", [2, 3, 5, 13])

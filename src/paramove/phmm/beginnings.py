@@ -73,7 +73,7 @@ class Beginnings:
             end = np.tile(np.eye(points.shape[3]), (POINTS, 1))
             if not increments:
                 end[: -points.shape[3]] = 0.0
-            return CorrelatedRegression.several_with_errors(ys, theta, monomials, groups, ridge, shrinkages, end)
+            return CorrelatedRegression.fitted_with_errors(ys, theta, monomials, groups, ridge, shrinkages, end)
 
         compared = {increments: of(COMPARED, increments, SHRINKAGES) for increments in (True, False)}
         error = {increments: sum(np.log(one) for _, one in results) for increments, results in compared.items()}
@@ -97,7 +97,7 @@ class Beginnings:
         return replace(self, regressions=tuple(own))
 
     def examined(self, sequence: Floats, margin: float, noise: AddedNoise | None = None) -> Examination:
-        """A beginning (T, D), with noise beyond that of the training; `margin` as `CorrelatedRegression.estimate`.
+        """A beginning (T, D), with noise beyond that of the training; `margin` as `CorrelatedRegression.estimates`.
 
         Raises ValueError for a beginning of fewer than 5 frames.
         """
@@ -124,13 +124,12 @@ class Beginnings:
         densities = condensed.log_norms - 0.5 * distances
         evidence = densities + 0.5 * np.linalg.slogdet(covariances)[1]
         weights = softmax(evidence * INDEPENDENT_NUMBERS / y.shape[1])
-        mean = weights @ theta
-        missed = theta - mean
+        mean, missed = weights @ theta, theta - weights @ theta
         covariance = np.einsum("k,kpq->pq", weights, covariances) + (weights * missed.T) @ missed
         best = int(weights.argmax())
-        usual = float(np.median(regressions[best].distances)) + 1e-9
-        density, outlier_score = float(densities[best]), float(np.sqrt(distances[best] / usual))
-        p_value = regressions[best].log_p_value(float(distances[best]))
+        density, own = float(densities[best]), regressions[best]
+        outlier_score = float(np.sqrt(distances[best] / (np.median(own.distances) + 1e-9)))
+        p_value = own.log_p_value(float(distances[best]))
         return Examination(ParameterEstimate(mean, covariance, density), outlier_score, density, p_value)
 
     @cached_property

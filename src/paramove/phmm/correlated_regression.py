@@ -70,20 +70,7 @@ class CorrelatedRegression:
     inverse: InverseRegression | None = None
 
     @classmethod
-    def fitted(
-        cls,
-        y: Floats,
-        theta: Floats,
-        monomials: Monomials,
-        groups: Ints,
-        ridge: tuple[float, ...] | None = None,
-        shrinkages: tuple[float, ...] = SHRINKAGES,
-    ) -> CorrelatedRegression:
-        """From movements (K, n), labels (K, P) and the number of the group of each (K,); a ridge may be given."""
-        return cls.several_with_errors([y], theta, monomials, groups, ridge, shrinkages)[0][0]
-
-    @classmethod
-    def several_with_errors(
+    def fitted_with_errors(
         cls,
         ys: Sequence[Floats],
         theta: Floats,
@@ -128,45 +115,28 @@ class CorrelatedRegression:
                 tested = [[numbers for numbers, _ in way] for way in own]
                 inverse, tests = InverseRegression.stacked(y, end, theta, list(zip(tested, tests, strict=True)))
             inflation = inflation_of([one.squares for one in tests], theta.shape[1], n_persons)
+            errors = np.linalg.norm(tests[0].missed / monomials.scale, axis=1)[np.isfinite(tests[0].distances)]
             # Movements that no fold tested are compared with a covariance that includes them.
             untested = np.isnan(distances)
-            if untested.any():
-                distances[untested] = regression.distances_from(y[untested], theta[untested])
-            errors = np.linalg.norm(tests[0].missed / monomials.scale, axis=1)
-            unseen = regression.unseen
-            if own[0]:
-                deviation = float(np.sqrt(np.nanmean(errors**2) / theta.shape[1]))
-                unseen = unseen_curvature(features, monomials.degrees, KNOWN * deviation)
-            error = float(np.nanmean(errors)) if own[0] and not few else np.inf
+            distances[untested] = regression.distances_from(y[untested], theta[untested])
+            deviation = np.sqrt((errors**2).sum() / max(1, len(errors)) / theta.shape[1])
+            unseen = unseen_curvature(features, monomials.degrees, KNOWN * float(deviation))
             regression = replace(regression, inflation=inflation, distances=distances, inverse=inverse, unseen=unseen)
-            results.append((regression, error))
+            results.append((regression, float(errors.mean()) if len(errors) and not few else np.inf))
         return results
 
-    def estimate(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
-        """Most likely theta (P,) and its widened covariance (P, P).
-
-        Args:
-            y: the movement, (n,).
-            margin: how far outside the bounds of the training theta may lie, as a fraction of their width.
-        """
-        theta, covariances = self.estimates(y[None], margin)
-        return theta[0], covariances[0]
-
-    def distance(self, y: Floats, theta: Floats) -> float:
-        """Squared Mahalanobis distance of a movement (n,) from that of theta (P,), plus n ln(1 + phi' V phi).
-
-        With that, -2 ln of the density up to a constant: what theta far from the training allow is not likely for it.
-        """
-        return float(self.distances_from(y[None], theta[None])[0])
-
     def estimates(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
-        """`estimate` of many movements (K, n): theta (K, P) and covariances (K, P, P)."""
-        self._check_length(y[0])
+        """Theta (K, P) of movements (K, n), and its calibrated covariances (K, P, P).
+
+        Theta lies outside the bounds of the training by at most `margin`, a fraction of their width.
+        """
         return self.condensed.estimates(y, margin)[:2]
 
     def distances_from(self, y: Floats, theta: Floats) -> Floats:
-        """`distance` of many movements (K, n) from those of theta (K, P). Shape (K,)."""
-        self._check_length(y[0])
+        """Squared Mahalanobis distances of movements (K, n) from those of theta (K, P), with n ln(1 + phi' V phi). (K,)
+
+        With that, -2 ln of the density up to a constant: what theta far from the training allow is not likely for it.
+        """
         return self.condensed.distances_from(y, theta)
 
     def adapted(self, y: Floats, theta: Floats, adaptation: Adaptation) -> CorrelatedRegression:
@@ -185,12 +155,15 @@ class CorrelatedRegression:
         own = self.root @ self.root.T
         moments = own if self.shrinkage >= 1.0 else own - self.shrinkage * np.diag(np.diagonal(own))
         distances = distances_with_noise(self.distances, own, moments, covariance)
-        root = np.linalg.cholesky(own + covariance).astype(np.float64)
-        inverse = self.inverse and self.inverse.widened(covariance)
-        return replace(self, root=root, distances=distances, inverse=inverse)
+        return replace(
+            self,
+            root=np.linalg.cholesky(own + covariance).astype(np.float64),
+            distances=distances,
+            inverse=self.inverse and self.inverse.widened(covariance),
+        )
 
     def log_density(self, distance: float) -> float:
-        """Logarithm of the density of a movement at a `distance`."""
+        """Logarithm of the density of a movement at a distance, see `distances_from`."""
         diagonal = np.diagonal(self.root)
         return float(-0.5 * distance - np.log(diagonal).sum() - 0.5 * len(diagonal) * np.log(2.0 * np.pi))
 
@@ -209,11 +182,11 @@ class CorrelatedRegression:
 
     def arrays(self) -> dict[str, Floats]:
         """Everything learned, for a file."""
-        scalars = np.array([self.inflation, self.shrinkage, *self.ridge])
         return {
             "coefficients": self.coefficients, "uncertainty": self.uncertainty, "unseen": self.unseen,
             "root": self.root,
-            "distances": self.distances, "groups": self.groups.astype(np.float64), "scalars": scalars,
+            "distances": self.distances, "groups": self.groups.astype(np.float64),
+            "scalars": np.array([self.inflation, self.shrinkage, *self.ridge]),
         } | ({} if self.inverse is None else {"inverse": self.inverse.array()})  # fmt: skip
 
     @classmethod
@@ -239,10 +212,6 @@ class CorrelatedRegression:
             own["distances"], own["groups"].astype(np.int64), tuple(ridge), shrinkage,
             None if inverse is None else InverseRegression.from_array(inverse, count, len(monomials.centre)),
         )  # fmt: skip
-
-    def _check_length(self, y: Floats) -> None:
-        if len(y) != len(self.coefficients):
-            raise ValueError(f"expected a movement of {len(self.coefficients)} numbers, found {len(y)}")
 
     @cached_property
     def condensed(self) -> CondensedRegressions:
@@ -296,7 +265,7 @@ class CondensedRegressions:
         return CondensedRegressions(monomials, inverse and inverse.part(chosen), *(one[chosen] for one in others))
 
     def estimates(self, y: Floats, margin: float) -> tuple[Floats, Floats, Floats]:
-        """Of movements (K, n) theta (K, P) and its covariances (K, P, P), see `CorrelatedRegression.estimate`.
+        """Of movements (K, n) theta (K, P) and its covariances (K, P, P), see `CorrelatedRegression.estimates`.
 
         And theta that explains each movement best, (K, P), from which distances count.
         """
@@ -318,7 +287,7 @@ class CondensedRegressions:
         return theta, covariances, nearest
 
     def distances_from(self, y: Floats, theta: Floats) -> Floats:
-        """Of movements (K, n) from those of theta (K, P), see `CorrelatedRegression.distance`. Shape (K,)."""
+        """Of movements (K, n) from those of theta (K, P), see `CorrelatedRegression.distances_from`. Shape (K,)."""
         phi = self.monomials.at(theta)
         missed = (self.inverses @ y[..., None] - self.white @ phi[..., None])[..., 0]
         factors = variances_at(phi, self.uncertainty)

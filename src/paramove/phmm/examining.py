@@ -92,19 +92,21 @@ class ExaminingPHMM(ParametricHMM):
         if self.performances_ is None:
             raise ValueError(INDEPENDENT)
         if not finished:
-            return self.performances_.examined_beginning(recorded, self.search_margin)
+            return self.performances_.beginnings.examined(recorded, self.search_margin, self.performances_.noise)
         estimate, parts = self._estimated(recorded, self.performances_)
-        nearest = self.performances_.complete.estimate(parts, self.search_margin)[0]
-        distance = self.performances_.complete.distance(parts, nearest)
+        complete = self.performances_.complete
+        distance = float(
+            complete.distances_from(parts[None], complete.estimates(parts[None], self.search_margin)[0])[0]
+        )
         outlier_score = self.performances_.outlier_score(distance, self.performances_.pace.distance(recorded))
-        density = self.performances_.complete.log_density(distance)
+        density = complete.log_density(distance)
         return Examination(estimate, outlier_score, density, self.performances_.log_p_value(outlier_score))
 
     def _estimated(self, recorded: Floats, performances: Performances) -> tuple[ParameterEstimate, Floats]:
         """Estimate from the distribution of whole executions, and the description of this one."""
         checked = self._checked(recorded)
         parts = movement_parts(recorded)
-        theta, covariance = performances.estimate(parts, self.search_margin)
+        (theta,), (covariance,) = performances.estimating.estimates(parts[None], self.search_margin)
         return ParameterEstimate(theta, covariance, self._log_likelihood_at(checked, theta)), parts
 
     def synthesize_through(self, theta: ArrayLike, via: Mapping[float, ArrayLike], n_samples: int) -> Floats:

@@ -133,10 +133,9 @@ class InverseRegression:
 
 def _coefficients(rows: Floats, theta: Floats) -> Floats:
     """Of theta (K, P) on the rows of each point (B, K, F), the first of them 1. Shape (B, F, P)."""
-    penalty = RIDGE * len(theta) * np.eye(rows.shape[2])
-    penalty[0, 0] = 1e-9
-    transposed = np.swapaxes(rows, 1, 2)
-    return np.asarray(np.linalg.solve(transposed @ rows + penalty, transposed @ theta), dtype=np.float64)
+    penalty = np.diag([1e-9, *[RIDGE * len(theta)] * (rows.shape[2] - 1)])
+    squares, products = np.swapaxes(rows, 1, 2) @ rows, np.swapaxes(rows, 1, 2) @ theta
+    return np.asarray(np.linalg.solve(squares + penalty, products), dtype=np.float64)
 
 
 def _missed(rows: Floats, theta: Floats, folds: Sequence[Ints]) -> Floats:

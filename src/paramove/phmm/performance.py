@@ -15,7 +15,6 @@ from paramove.hmm import resample
 from paramove.phmm.adaptation import Adaptation
 from paramove.phmm.beginnings import Beginnings
 from paramove.phmm.correlated_regression import CorrelatedRegression
-from paramove.phmm.estimates import Examination
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, distances_with_noise, moving_average
 from paramove.phmm.predictive_distribution import PredictiveDistribution
@@ -99,10 +98,9 @@ class Performances:
         """From movements as recorded, in their own time."""
         parts = np.stack([movement_parts(sequence) for sequence in sequences])
         end = np.eye(parts.shape[1])[:, -sequences[0].shape[1] :]
-        complete = CorrelatedRegression.fitted(parts, theta, monomials, groups, shrinkages=(OUTLIER_SHRINKAGE,))
-        ((estimating, _),) = CorrelatedRegression.several_with_errors(
-            [parts], theta, monomials, groups, complete.ridge, end=end
-        )
+        fitted = CorrelatedRegression.fitted_with_errors
+        ((complete, _),) = fitted([parts], theta, monomials, groups, shrinkages=(OUTLIER_SHRINKAGE,))
+        ((estimating, _),) = fitted([parts], theta, monomials, groups, complete.ridge, end=end)
         beginnings = Beginnings.fitted(sequences, theta, monomials, groups, complete.ridge)
         pace = Pace.fitted(sequences, groups)
         return cls(complete, beginnings, pace, estimating)
@@ -123,10 +121,6 @@ class Performances:
         pace = self.pace.expecting(noise.variance, noise.sequence)
         complete, estimating = self.complete.widened(of_parts), self.estimating.widened(of_parts)
         return replace(self, complete=complete, pace=pace, estimating=estimating, noise=noise)
-
-    def estimate(self, parts: Floats, margin: float) -> tuple[Floats, Floats]:
-        """Theta (P,) and its covariance (P, P) of a complete movement, from its `movement_parts`."""
-        return self.estimating.estimate(parts, margin)
 
     def outlier_score(self, distance: float, pace_distance: float) -> float:
         """Distance of a complete movement from the training; about 1.3 for genuine ones.
@@ -151,10 +145,6 @@ class Performances:
         known = np.log(_outlier_score(distances, paces, distances, paces) + 1e-9)
         return PredictiveDistribution.of(known, self.complete.groups)
 
-    def examined_beginning(self, sequence: Floats, margin: float) -> Examination:
-        """See `Beginnings.examined`."""
-        return self.beginnings.examined(sequence, margin, self.noise)
-
     def arrays(self) -> dict[str, Floats]:
         """Everything learned, for a file."""
         result = {f"complete_{name}": value for name, value in self.complete.arrays().items()}
@@ -167,15 +157,10 @@ class Performances:
         """From the result of `arrays`. Raises KeyError for a missing array, ValueError for shapes that do not fit."""
         complete = CorrelatedRegression.from_arrays(arrays, "complete_", monomials)
         estimating = CorrelatedRegression.from_arrays(arrays, "estimating_", monomials)
-        if estimating.coefficients.shape != complete.coefficients.shape:
-            raise ValueError(
-                f"expected estimating_coefficients of shape {complete.coefficients.shape}, found "
-                f"{estimating.coefficients.shape}"
-            )
         beginnings = Beginnings.from_arrays(arrays, monomials)
         pace = Pace(arrays["pace_mean"], arrays["pace_root"], arrays["pace_distances"])
         expected = {"pace_mean": (PACE_PARTS,), "pace_root": (PACE_PARTS, PACE_PARTS)}
-        expected["pace_distances"] = complete.distances.shape
+        expected |= {"pace_distances": complete.distances.shape, "estimating_root": complete.root.shape}
         for name, shape in expected.items():
             if arrays[name].shape != shape:
                 raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
