@@ -2,11 +2,13 @@
 
 import hashlib
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from paramove.demonstrations import DemonstrationSet
 from tests.cli.conftest import call
 
 
@@ -83,6 +85,56 @@ def test_plot(trained, tmp_path, ending):
     else:
         assert "data:image/png;base64," in file.read_text()
     assert "did you mean 'wrist'?" in rejected(78, "plot", trained.model, "--point", "wrst")
+
+
+@pytest.fixture
+def taller(trained, tmp_path):
+    """Three movements of a person whose body is a tenth larger, and six of them to test with."""
+    demonstrations = DemonstrationSet.load(trained.table)
+    folders = tmp_path / "taller", tmp_path / "tested"
+    for folder, numbers in zip(folders, (slice(0, 27, 10), slice(4, 27, 4)), strict=True):
+        own = [
+            replace(one, positions=1.1 * one.positions, subject="taller") for one in demonstrations.movements[numbers]
+        ]
+        replace(demonstrations, movements=tuple(own)).write(folder)
+    return folders
+
+
+def explained(model, folder):
+    return json.loads(good("compare", model, model, "--on", folder, "--json"))["on"][0]
+
+
+def test_adapted_to_a_person_movements_and_theta_are_theirs(trained, taller, tmp_path):
+    own, tested = taller
+    adapted = tmp_path / "own.npz"
+    assert "adapted to taller by 3 movements" in good("adapt", trained.model, own, "--out", adapted)
+    before, after = explained(trained.model, tested), explained(adapted, tested)
+    assert after["synthesis_median_m"] < 0.8 * before["synthesis_median_m"]
+    assert sum(after["theta_rms"].values()) < 0.8 * sum(before["theta_rms"].values())
+
+
+def test_adapted_without_labels_only_synthesis_changes(trained, taller, tmp_path):
+    own, tested = taller
+    adapted = tmp_path / "own.npz"
+    good("adapt", trained.model, own, "--out", adapted, "--no-labels")
+    before, after = explained(trained.model, tested), explained(adapted, tested)
+    assert after["theta_rms"] == before["theta_rms"]
+    assert after["synthesis_median_m"] != before["synthesis_median_m"]
+
+
+def test_adapt_refuses_several_persons_and_other_parameters(trained, taller, tmp_path):
+    demonstrations = DemonstrationSet.load(trained.table)
+    first, second, *_ = demonstrations.movements
+    two = tmp_path / "two"
+    replace(demonstrations, movements=(first, replace(second, subject="B"))).write(two)
+    own = tmp_path / "own.npz"
+    assert "one person" in rejected(78, "adapt", trained.model, two, "--out", own)
+    assert "no movement with" in rejected(78, "adapt", trained.model, two, "--out", own, "--subject", "nobody")
+    unlabelled = tmp_path / "unlabelled"
+    names = tuple(f"other_{name}" for name in first.parameter_names)
+    replace(demonstrations, movements=(replace(first, parameter_names=names),)).write(unlabelled)
+    assert "--no-labels" in rejected(78, "adapt", trained.model, unlabelled, "--out", own)
+    assert not own.exists()
 
 
 def test_compare(trained, tmp_path):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from paramove.cli.bus_options import JsonOption
-from paramove.cli.demos_options import PointOption, ended, table_of
+from paramove.cli.demos_options import PointOption, SetArgument, SubjectOption, ended, table_of
 from paramove.cli.model_options import ModelArgument, loaded, model_files, one_line
 from paramove.documents import InputError, exit_codes, printable
 
@@ -184,6 +184,44 @@ def plot(
         model = loaded(file)
         write_plot(plot_model(model, point), output, title_of(model))
     typer.echo(str(output))
+
+
+@app.command()
+def adapt(
+    file: ModelArgument,
+    folder: SetArgument,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="file of the person's model, .npz")],
+    subject: SubjectOption = None,
+    labels: Annotated[
+        bool, typer.Option(help="use the theta of the set; without, only what is synthesized adapts")
+    ] = True,
+) -> None:
+    """Adapt a model of other persons to a person: about three movements of the model's action suffice.
+
+    Exit codes: 0; 66 a file or the set is missing; 78 one is damaged, or movements, persons or theta do not fit.
+    """
+    from paramove.demonstrations import DemonstrationError, DemonstrationSet
+    from paramove.phmm import MovementClassifier
+    from paramove.training import Examiner, parameter_names
+
+    with one_line():
+        model = loaded(file)
+        action = model.description.action if model.description else None
+        chosen = DemonstrationSet.load(folder).select(action, subject)
+        if len(chosen.subjects) > 1:
+            raise DemonstrationError(
+                f"a model is adapted to one person; {folder} has {', '.join(chosen.subjects)}: --subject chooses one"
+            )
+        examiner = Examiner(MovementClassifier.from_models({action or file.stem: model}))
+        recognitions = [examiner.examine(movement) for movement in chosen]
+        theta = [one.labelled for one in recognitions if one.labelled is not None] if labels else None
+        if theta is not None and len(theta) < len(recognitions):
+            raise DemonstrationError(
+                f"{folder}: the model has the parameters {', '.join(parameter_names(model))}, the set has "
+                f"{', '.join(chosen.parameter_names) or 'none'}; --no-labels adapts what is synthesized alone"
+            )
+        model.adapt([one.movement.frames for one in recognitions], theta).save(out)
+    typer.echo(f"{out}: adapted to {chosen.subjects[0] or 'a person'} by {len(recognitions)} movements")
 
 
 @app.command()
