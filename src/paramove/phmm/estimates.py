@@ -10,7 +10,7 @@ from paramove.documents import Floats, renamed_attribute
 
 
 class ParameterEstimate(NamedTuple):
-    """Maximum likelihood theta (P,), its covariance (P, P) and the log-likelihood there."""
+    """Theta (P,), its covariance (P, P) and the log-likelihood there; with independent residuals the largest one."""
 
     theta: Floats
     covariance: Floats

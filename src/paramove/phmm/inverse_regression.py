@@ -113,9 +113,12 @@ class InverseRegression:
 
     @classmethod
     def from_array(cls, array: Floats, n: int, dimension: int) -> Self:
-        """From the result of `array`, of movements of n numbers, theta of P. Raises ValueError for another shape."""
-        if array.shape != (dimension, n + 2 + dimension):
-            raise ValueError(f"expected an inverse of shape ({dimension}, {n + 2 + dimension}), found {array.shape}")
+        """From the result of `array`, of movements of n numbers, theta of P. Raises ValueError if it is none."""
+        if array.shape != (dimension, n + 2 + dimension) or not 0.0 <= array[0, -1] <= 1.0:
+            raise ValueError(
+                f"expected an inverse of shape ({dimension}, {n + 2 + dimension}) with a weight of 0 to 1 at its end, "
+                f"found {array.shape} and {array.ravel()[-1:]}"
+            )
         gains, offset, covariance, weight = np.split(array, [n, n + 1, n + 1 + dimension], axis=1)
         return cls(np.ascontiguousarray(gains), offset[:, 0], covariance, float(weight[0, 0]))
 

@@ -42,9 +42,10 @@ class PolynomialPHMM(ExaminingPHMM):
         degree: of the polynomials; 1 is the linear PHMM of Wilson and Bobick.
         smoothness: fraction of the movement over which the dependence on theta changes little: length of the prior that
             couples the slopes of neighbouring states, its strength chosen by the evidence. None: no prior, plain EM.
-        residuals: "correlated" learns how whole executions vary: `estimate` then models dependent frames, its
-            covariance is realistic, beginnings and outliers are recognised, and the means are those
-            that predict left-out groups best. "independent" is the thesis: maximum likelihood of frames.
+        residuals: "correlated" learns how whole executions vary: `estimate` then models dependent frames and weights
+            what the last position of each body point shows, its covariance is realistic, beginnings and outliers are
+            recognised, and the means are those that predict left-out groups best. "independent" is the thesis: maximum
+            likelihood of frames.
         search_margin: how far outside the training's bounds `estimate` searches, as a fraction of their width.
 
     Attributes:
