@@ -271,6 +271,7 @@ def regions(out: Path) -> dict[str, Any]:
     found = []
     for name in ("few", "real"):
         for task, rows in load(out / f"{name}.json").items():
+            measures = rows.get("paramove, quadratic PHMM", {}).get("measures", {})
             own, plain, ridge, moving, hand, last = (
                 {key: one["value"] for key, one in rows.get(row, {}).get("measures", {}).items()}
                 for row in (
@@ -291,8 +292,16 @@ def regions(out: Path) -> dict[str, Any]:
                 for one in (own, moving, hand)
             )
             keys = ("covered_50", "covered_80", "covered", "covered_set", "below_1", "below_5", "below_20")
+            keys += ("dtw", "auroc_aborted", "auroc_stopped")
+            between = "–".join(f"{factor * measures['theta'][end]:.2f}" for end in ("low", "high"))
             found.append(
-                {"task": task, "theta": theta, "ridge": by_ridge, "independent": plain.get("covered")}
+                {"task": task, "theta": theta, "theta_interval": between, "ridge": by_ridge}
+                | {"independent": plain.get("covered")}
+                | {
+                    f"{what}_{percent}": f"{factor * one[f'theta_{percent}']:.3g}{unit}"
+                    for percent in (50, 75)
+                    for what, one in (("after", own), ("moving", moving))
+                }
                 | {"at_end": at_end, "after": after, "moving_after": moving_after, "hand_after": hand_after}
                 | {key: own[key] for key in keys}
             )
