@@ -68,6 +68,19 @@ def test_left_out_errors_are_those_of_a_regression_of_the_others() -> None:
         assert_allclose(both.missed[tested], found - theta[tested], atol=1e-4)
 
 
+def test_a_component_that_never_varies_does_not_choose_the_weights() -> None:
+    y, last, theta = recorded(0.02)
+    model = found_with(0.02, theta)
+    alone, _ = InverseRegression.stacked(y, last, theta, [(FOLDS, model)])
+    height = np.full((COUNT, 1), 0.07)
+    missed = np.concatenate([model.missed, 0.01 * np.ones((COUNT, 1))], axis=1)
+    flat = LeftOut(missed, np.tile(0.02**2 * np.eye(3), (COUNT, 1, 1)), model.distances)
+    inverse, (both,) = InverseRegression.stacked(y, last, np.hstack([theta, height]), [(FOLDS, flat)])
+    assert_allclose(inverse.weight, alone.weight, rtol=1e-9)
+    assert np.isfinite(both.squares).all()
+    assert (np.linalg.eigvalsh(inverse.covariance) > 0.0).all()
+
+
 def test_the_unit_of_frames_does_not_matter() -> None:
     metres, _, y, theta = stacked(0.02, 0.02)
     millimetres, _, _, _ = stacked(0.02, 0.02, scale=1000.0)

@@ -64,6 +64,20 @@ def test_tiny_training_sets_examine_and_come_back_from_files(
         assert again.examine(sequence, finished=finished)[1:] == found[1:]
 
 
+@pytest.mark.parametrize("finished", [True, False])
+@pytest.mark.parametrize("repetitions", [1, 3])
+def test_a_component_of_theta_that_never_varies_is_no_obstacle(repetitions: int, finished: bool) -> None:
+    rng = np.random.default_rng(3)
+    theta = np.repeat([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]], repetitions, axis=0)
+    sequences = [wave(one, rng) for one in theta]
+    x = wave(np.array([0.4, 0.0]), rng)
+    x = x if finished else x[:20]
+    found = untrained(LinearPHMM).fit(sequences, theta).examine(x, finished=finished).estimate
+    without = untrained(LinearPHMM).fit(sequences, theta[:, :1]).estimate(x, finished=finished)
+    assert_allclose(found.theta[0], without.theta[0], atol=0.1)
+    assert (np.linalg.eigvalsh(found.covariance) > 0.0).all()
+
+
 def test_a_stranger_movement_is_less_typical() -> None:
     performances = trained(QuadraticPHMM).performances_
     found = [performances.log_p_value(outlier_score) for outlier_score in (0.0, 0.5, 1.3, 3.0, 100.0, 1e12)]

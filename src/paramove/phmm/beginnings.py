@@ -70,10 +70,9 @@ class Beginnings:
             numbers: Sequence[int], increments: bool, shrinkages: tuple[float, ...]
         ) -> list[tuple[CorrelatedRegression, float]]:
             ys = [described(points[:, number], increments) for number in numbers]
-            end = np.tile(np.eye(points.shape[3]), (POINTS, 1))
-            if not increments:
-                end[: -points.shape[3]] = 0.0
-            return CorrelatedRegression.fitted_with_errors(ys, theta, monomials, groups, ridge, shrinkages, end)
+            # The last point is the sum of all rows, or the last row.
+            last: Floats = np.kron(np.ones(POINTS) if increments else np.eye(POINTS)[-1], np.eye(points.shape[3])).T
+            return CorrelatedRegression.fitted_with_errors(ys, theta, monomials, groups, ridge, shrinkages, last)
 
         compared = {increments: of(COMPARED, increments, SHRINKAGES) for increments in (True, False)}
         error = {increments: sum(np.log(one) for _, one in results) for increments, results in compared.items()}
@@ -124,7 +123,8 @@ class Beginnings:
         densities = condensed.log_norms - 0.5 * distances
         evidence = densities + 0.5 * np.linalg.slogdet(covariances)[1]
         weights = softmax(evidence * INDEPENDENT_NUMBERS / y.shape[1])
-        mean, missed = weights @ theta, theta - weights @ theta
+        mean = weights @ theta
+        missed = theta - mean
         covariance = np.einsum("k,kpq->pq", weights, covariances) + (weights * missed.T) @ missed
         best = int(weights.argmax())
         density, own = float(densities[best]), regressions[best]

@@ -110,15 +110,15 @@ class CorrelatedRegression:
             shrinkage = _chosen_shrinkage(own[0], y, theta, shrinkages)
             regression = everything.regression(groups, chosen, shrinkage)
             tests = [_left_out(one, y, theta, groups, (chosen, shrinkage)) for one in own]
-            inverse, distances = None, tests[-1].distances
+            inverse = None
             if end is not None and own[0]:
-                tested = [[numbers for numbers, _ in way] for way in own]
-                inverse, tests = InverseRegression.stacked(y, end, theta, list(zip(tested, tests, strict=True)))
+                left_out = [([tested for tested, _ in way], found) for way, found in zip(own, tests, strict=True)]
+                inverse, tests = InverseRegression.stacked(y, end, theta, left_out)
             inflation = inflation_of([one.squares for one in tests], theta.shape[1], n_persons)
             errors = np.linalg.norm(tests[0].missed / monomials.scale, axis=1)[np.isfinite(tests[0].distances)]
             # Movements that no fold tested are compared with a covariance that includes them.
-            untested = np.isnan(distances)
-            distances[untested] = regression.distances_from(y[untested], theta[untested])
+            everywhere = regression.distances_from(y, theta)
+            distances = np.where(np.isnan(tests[-1].distances), everywhere, tests[-1].distances)
             deviation = np.sqrt((errors**2).sum() / max(1, len(errors)) / theta.shape[1])
             unseen = unseen_curvature(features, monomials.degrees, KNOWN * float(deviation))
             regression = replace(regression, inflation=inflation, distances=distances, inverse=inverse, unseen=unseen)

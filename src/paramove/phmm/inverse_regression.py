@@ -23,7 +23,7 @@ from paramove.phmm.left_out import LeftOut
 RIDGE = 1e-3
 """Of the standardised coordinates of a point, as a fraction of the number of movements."""
 LEAST_DEVIATION = 1e-6
-"""Of errors of theta, in units of its range: of few left-out movements."""
+"""Of errors of theta, in units of its range, as of a component that never varies."""
 SUM_WEIGHT = 1e3
 """Of the condition that the weights have the sum 1, in their least squares."""
 
@@ -63,11 +63,14 @@ class InverseRegression:
         rows = np.concatenate([np.ones((*rows.shape[:2], 1)), rows], axis=2)
         missed = [np.concatenate([found.missed[None], _missed(rows, theta, folds)]) for folds, found in ways]
         known, caution = np.isfinite(ways[0][1].distances), 1.0 / len(ways[0][0])
-        weights = _stacking_weights(missed[0][:, known], caution)
+        widths = np.ptp(theta, axis=0)
+        varying = missed[0][..., widths > 0.0]  # a component that never varies is known exactly by its mean alone
+        weights = _stacking_weights(varying[:, known], caution)
         shares = weights[1:] / max(weights[1:].sum(), 1e-12)
         spread = np.tensordot(shares, missed[0][1:, known], axes=1)
         covariance = spread.T @ spread / len(spread)
-        covariance += np.diag(np.diagonal(covariance) / len(spread) + (LEAST_DEVIATION * np.ptp(theta, axis=0)) ** 2)
+        least = (LEAST_DEVIATION * np.where(widths > 0.0, widths, 1.0)) ** 2
+        covariance += np.diag(np.diagonal(covariance) / len(spread) + least)
         learned = (shares[:, None, None] * _coefficients(rows, theta)).astype(np.float64)
         of_frame = (learned[:, 1:].reshape(len(deviation), -1) / deviation[:, None]).T
         offset = learned[:, 0].sum(axis=0) - of_frame @ centre
@@ -76,7 +79,7 @@ class InverseRegression:
             both = np.full(theta.shape, np.nan)
             for tested in folds:
                 others = np.setdiff1d(np.flatnonzero(known), tested)
-                own = _stacking_weights(missed[0][:, others], caution) if len(others) else weights
+                own = _stacking_weights(varying[:, others], caution) if len(others) else weights
                 both[tested] = np.tensordot(own, errors[:, tested], axes=1)
             together.append(LeftOut(both, result._covariances(found.covariances), found.distances))
         return result, together
@@ -87,8 +90,8 @@ class InverseRegression:
         One regression of all movements or one for each, as `together` makes it.
         """
         weight = np.asarray(self.weight)[..., None]
-        inverse = (self.gains @ y[..., None])[..., 0] + self.offset
-        return (1.0 - weight) * theta + weight * inverse, self._covariances(covariances)
+        both = (1.0 - weight) * theta + weight * ((self.gains @ y[..., None])[..., 0] + self.offset)
+        return both, self._covariances(covariances)
 
     def _covariances(self, model: Floats) -> Floats:
         """As if errors of both were independent, which the inflation of regions corrects; from those of the model."""

@@ -98,12 +98,14 @@ class Performances:
         """From movements as recorded, in their own time."""
         parts = np.stack([movement_parts(sequence) for sequence in sequences])
         end = np.eye(parts.shape[1])[:, -sequences[0].shape[1] :]
-        fitted = CorrelatedRegression.fitted_with_errors
-        ((complete, _),) = fitted([parts], theta, monomials, groups, shrinkages=(OUTLIER_SHRINKAGE,))
-        ((estimating, _),) = fitted([parts], theta, monomials, groups, complete.ridge, end=end)
+        ((complete, _),) = CorrelatedRegression.fitted_with_errors(
+            [parts], theta, monomials, groups, shrinkages=(OUTLIER_SHRINKAGE,)
+        )
+        ((estimating, _),) = CorrelatedRegression.fitted_with_errors(
+            [parts], theta, monomials, groups, complete.ridge, end=end
+        )
         beginnings = Beginnings.fitted(sequences, theta, monomials, groups, complete.ridge)
-        pace = Pace.fitted(sequences, groups)
-        return cls(complete, beginnings, pace, estimating)
+        return cls(complete, beginnings, Pace.fitted(sequences, groups), estimating)
 
     def adapted(self, sequences: Sequence[Floats], theta: Floats, adaptation: Adaptation) -> Performances:
         """Of the person whose movements at theta (K, P) these are."""
