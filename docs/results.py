@@ -233,24 +233,26 @@ def real_images(out: Path) -> dict[str, Any]:
     return {"rows": [*rows, {"name": "a hand left on the knee", **resting}]}
 
 
+COMPARED_METHODS = {
+    "quadratic": "paramove, quadratic PHMM",
+    "linear": "paramove, linear PHMM",
+    "cubic": "paramove, cubic PHMM",
+    "ridge": "PCA + quadratic ridge, full covariance (tuned)",
+    "promp": "ProMP, quadratic context, linear time (tuned)",
+    "minirocket": "MiniRocket (default)",
+}
+
+
 def movements(out: Path) -> dict[str, Any]:
     """Errors of synthesis and theta by task; coverage of the quadratic model and of its peers."""
-    methods = {
-        "quadratic": "paramove, quadratic PHMM",
-        "linear": "paramove, linear PHMM",
-        "cubic": "paramove, cubic PHMM",
-        "ridge": "PCA + quadratic ridge, full covariance (tuned)",
-        "promp": "ProMP, quadratic context, linear time (tuned)",
-        "minirocket": "MiniRocket (default)",
-    }
     errors, sure = [], []
     for task, rows in load(out / "numbers.json").items():
         values = {name: {key: one["value"] for key, one in row["measures"].items()} for name, row in rows.items()}
-        own = values.get(methods["quadratic"], {})
+        own = values.get(COMPARED_METHODS["quadratic"], {})
         theirs = [one for name, one in values.items() if not name.startswith("paramove")]
         if "theta" not in own:
             continue
-        named = {key: values.get(name, {}) for key, name in methods.items()}
+        named = {key: values.get(name, {}) for key, name in COMPARED_METHODS.items()}
         errors.append({"task": task, **{key: [one.get("dtw"), one.get("theta")] for key, one in named.items()}})
         covered = [one["covered"] for one in theirs if "covered" in one]
         sure.append(
@@ -506,13 +508,11 @@ MEASUREMENTS = {
     "movements": Measurement(
         (
             "python -m studies peers --on real --jobs 2 --task pointing/corners --task pointing/direction"
-            " --task table/reach --task table/drink --method 'linear PHMM' --method 'quadratic PHMM'"
-            " --method 'cubic PHMM' --method 'PCA + quadratic ridge, full covariance (tuned)'"
-            " --method 'ProMP, quadratic context, linear time (tuned)' --method 'MiniRocket (default)'"
-            " --out {out} --json {out}/numbers.json",
+            " --task table/reach --task table/drink --out {out} --json {out}/numbers.json"
+            + "".join(f" --method '{name}'" for name in COMPARED_METHODS.values()),
         ),
         movements,
-        "40 minutes",
+        "10 minutes",
     ),
     "regions": Measurement(
         (

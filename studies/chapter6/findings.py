@@ -157,7 +157,7 @@ def _complex(tracks: Sequence[Track]) -> Finding | None:
     measured = dual(own)
     if measured is None:
         return None
-    thesis = "camera 2: a simple and a dual pointing are told apart; a high p(B, τ > ½) tells"
+    thesis = "camera 2: a simple and a dual pointing are distinguished by a high p(B, τ > ½)"
     observed = (
         f"camera 2: {measured['right']} of {measured['of']} by the target that is reported, "
         f"{100 * measured['share by the posterior']:.0f} % by the posterior alone"

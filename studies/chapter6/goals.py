@@ -50,8 +50,8 @@ def goals_of(tracks: Sequence[Track]) -> list[Goal]:
         *_two_quantiles("one view, 50 fps: target on the table", fast, 4.0, 8.0),
         _lost("lost, four views", four),
         _lost("lost, one view", single),
-        _recognised("carrying actions A and B told apart at the grasp, four views", four),
-        _recognised("carrying actions A and B told apart at the grasp, one view", single),
+        _recognised("carrying actions A and B distinguished at the grasp, four views", four),
+        _recognised("carrying actions A and B distinguished at the grasp, one view", single),
         *_complex(four),
         _simple(tracks),
     ]
@@ -116,7 +116,7 @@ def _recognised(what: str, tracks: Sequence[Track]) -> Goal:
 def _complex(four: Sequence[Track]) -> list[Goal]:
     measured = dual([track for track in four if track.kind == "complex"])
     what = "targets of dual pointing, four views"
-    goals = [_fraction("simple and dual pointing told apart, four views", measured)]
+    goals = [_fraction("simple and dual pointing distinguished, four views", measured)]
     for name in ("first", "second"):
         if measured is None or not measured["dual"]:
             goals.append(_unjudged(f"{what}, {name}, median", "≤ 5 cm"))

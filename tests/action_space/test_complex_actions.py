@@ -1,4 +1,4 @@
-"""Simple and dual pointing told apart by the grammar of figure 6.26, from primitives (thesis 6.7.3)."""
+"""Simple and dual pointing distinguished by the grammar of figure 6.26, from primitives (thesis 6.7.3)."""
 
 from dataclasses import replace
 
