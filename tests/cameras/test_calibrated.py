@@ -66,13 +66,6 @@ def test_cameras_come_back_from_their_file(tmp_path):
             assert_allclose(getattr(after, name), getattr(before, name), rtol=1e-15, atol=0.0)
 
 
-def test_cameras_come_back_from_their_messages():
-    camera = lens_camera()
-    again = CalibratedCamera.from_foxglove(*camera.to_foxglove())
-    assert_allclose(again.project(points()), camera.project(points()), rtol=0.0, atol=1e-9)
-    assert again.name == "left"
-
-
 def test_a_wrong_file_is_refused_with_what_would_help(tmp_path):
     with pytest.raises(InputError, match="paramove calibrate cameras"):
         read_cameras(tmp_path / "none.yaml")

@@ -12,8 +12,7 @@ from numpy.testing import assert_allclose
 
 from paramove.bus import topics
 from paramove.bus.topics import Topic
-from paramove.dashboard.live_picture import LivePicture, Surface
-from paramove.dashboard.node_table import NodeTable
+from paramove.dashboard.live_picture import LivePicture, NodeTable, Surface
 from paramove.dashboard.robot_shape import RobotShape
 from paramove.motion.setup import SurfaceParameters
 from paramove.msgs.gesture_pb2 import Gesture

@@ -16,7 +16,7 @@ from paramove.motion.reaching_file import load_reaching_model
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.motion.timing import minimum_jerk
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
+from paramove.robots.dynamixel.arm.gravity_compensated_arm import TorqueOffArm
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.training.examples import examples_of

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from paramove.hmm import ChainParameters, GaussianHMM, LeftRightHMM, SequenceLengthError, TrainingOptions
 from paramove.hmm.chain import Topology
-from paramove.hmm.initialisation import initial_chain
+from paramove.hmm.gaussian import initial_chain
 from paramove.hmm.training import equal_segments
 from tests.hmm.chain_oracle import Chain, forward_backward, trained
 from tests.hmm.expanded import expanded_transitions

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.motion.joint_path import joined
+from paramove.motion.clear_plans import joined
 from paramove.motion.planned_motion import PlannedMotion
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.robots.description import RobotDescription

@@ -10,7 +10,7 @@ from foxglove_schemas_protobuf.JointState_pb2 import JointState
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.motion.arm_state import REST_NS
-from paramove.motion.joint_path import joined, joint_motion
+from paramove.motion.clear_plans import joined, joint_motion
 from paramove.motion.synthesizer import RESTARTED, STATUS_TIMEOUT_NS
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus

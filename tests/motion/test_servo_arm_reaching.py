@@ -10,7 +10,7 @@ from paramove.motion.planned_motion import PlannedMotion, RestPose
 from paramove.motion.plans import NoPlanError
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.robots.description import DescriptionError
-from paramove.robots.out_of_reach import OutOfReachError
+from paramove.robots.planar_arm import OutOfReachError
 from paramove.safety.trajectory_check import check_trajectory
 from tests.motion.reaching import HOAP3, reaching_model
 from tests.motion.servo_reaching import GRASP_Z, description, pick_and_place, places, reaching

@@ -9,8 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paramove.robots.description import RobotDescription
-from paramove.robots.out_of_reach import OutOfReachError
-from paramove.robots.planar_arm import PlanarArm
+from paramove.robots.planar_arm import OutOfReachError, PlanarArm
 from tests.robots.servo_arms import ARMS, KOCH, OPEN_MANIPULATOR_X, ArmModel
 
 each_arm = pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.name)

@@ -40,11 +40,6 @@ def action_probabilities(action: Ints, weights: Floats, n_actions: int) -> Float
     return np.bincount(action, weights, n_actions).astype(np.float64)
 
 
-def probability_within(action: Ints, tau: Floats, weights: Floats, which: int, low: float, high: float) -> float:
-    """p_t(a, tau in [low, high]) (6.9)."""
-    return float(weights[(action == which) & (tau >= low) & (tau <= high)].sum())
-
-
 def theta_estimate(theta: Floats, weights: Floats) -> ThetaEstimate:
     """Of the particles of one action, theta (K, P), weights (K,) not normalised (6.10)-(6.12)."""
     normalised = weights / weights.sum()

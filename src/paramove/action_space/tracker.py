@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paramove.action_space.estimates import (
     KERNEL_WIDTHS,
@@ -21,13 +22,61 @@ from paramove.action_space.estimates import (
 from paramove.action_space.grammar import Grammar
 from paramove.action_space.particle_filter import FilterOptions, Measurement, ParticleFilter, effective_number
 from paramove.action_space.placement import PersonPlacement
-from paramove.action_space.propagation import THESIS_RATE_HZ, Propagation, PropagationOptions, per_step
-from paramove.action_space.reached_target import ReachedTarget, reached_target
+from paramove.action_space.propagation import THESIS_RATE_HZ, Particles, Propagation, PropagationOptions, per_step
 from paramove.action_space.target_detection import DetectedTarget, DetectionOptions, TargetDetector
 from paramove.action_space.track_health import HealthOptions, TrackHealth
-from paramove.action_space.vocabulary import Vocabulary
+from paramove.action_space.vocabulary import PLACE_SIZE, ActionModel, Vocabulary
 from paramove.documents import Floats, InputError, Ints
 from paramove.observation import HAND, Presence
+
+CONTACT = 0.8
+"""Fraction of the largest dependence of the hand on a target from which on the hand is at that target."""
+
+
+@dataclass(frozen=True)
+class ReachedTarget:
+    """The target of the particles whose hand is at one.
+
+    Attributes:
+        contact: posterior probability of a progress at which the hand is at a target of its action.
+        action: name of the most probable action among those.
+        theta: coordinates (u, v) of the target. position: in the models' frame, m, (3,).
+    """
+
+    contact: float
+    action: str
+    theta: ThetaEstimate
+    position: Floats
+
+
+def reached_target(vocabulary: Vocabulary, action: Ints, particles: Particles) -> ReachedTarget | None:
+    """The target at which the hand is, by all actions with the same target function; None if no particle is at one.
+
+    When one action ends at a target and the next begins at_target (6.7.3), particles of both contribute.
+    """
+    at_target = np.zeros(len(particles), dtype=np.bool_)
+    coordinates = np.empty((len(particles), PLACE_SIZE))
+    for number, model in enumerate(vocabulary.actions):
+        rows = np.flatnonzero(action == number)
+        if len(rows):
+            at_target[rows], coordinates[rows] = _at_target(model, particles.theta[rows], particles.tau[rows])
+    mass = np.bincount(action[at_target], particles.weights[at_target], len(vocabulary))
+    if not mass.sum() > 0.0:
+        return None
+    likeliest = vocabulary.actions[int(mass.argmax())]
+    same_target = np.array([model.target is likeliest.target for model in vocabulary.actions])
+    chosen = at_target & same_target[action]
+    theta = theta_estimate(coordinates[chosen], particles.weights[chosen])
+    return ReachedTarget(float(mass.sum()), likeliest.name, theta, likeliest.target(theta.mean))
+
+
+def _at_target(model: ActionModel, theta: Floats, tau: Floats) -> tuple[NDArray[np.bool_], Floats]:
+    """Whether each hand is at a target, and the coordinates of the target on which it depends most. (K,), (K, 2)."""
+    dependence = np.stack([model.at_progress(table, tau) for table in model.place_dependence])
+    which = dependence.argmax(axis=0)
+    places = theta[:, : model.n_parameters].reshape(len(theta), -1, PLACE_SIZE)
+    return dependence.max(axis=0) >= CONTACT, places[np.arange(len(theta)), which]
+
 
 MIN_CONCENTRATION = 0.8
 """Length of the mean of the progress as a direction, 0 (scattered over all of the action) to 1."""

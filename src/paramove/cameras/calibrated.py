@@ -14,8 +14,6 @@ from typing import Any, cast
 
 import cv2
 import numpy as np
-from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
-from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
 
@@ -25,8 +23,6 @@ MAX_CAMERAS = 4
 WORLD_FRAME = "table"
 COEFFICIENTS = (0, 4, 5, 8, 12, 14)
 """Numbers of distortion coefficients that OpenCV supports."""
-
-_MODELS = {0: "plumb_bob", 4: "plumb_bob", 5: "plumb_bob", 8: "rational_polynomial"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,51 +126,6 @@ class CalibratedCamera:
         turn, shift = self.camera_from_world[:3, :3], self.camera_from_world[:3, 3]
         result: Floats = -turn.T @ shift
         return result
-
-    def to_foxglove(self, world_frame: str = WORLD_FRAME) -> tuple[CameraCalibration, FrameTransform]:
-        """The standard messages of lens and pose. Raises InputError for a lens that they cannot represent."""
-        from scipy.spatial.transform import Rotation  # half a second, which only messages should cost
-
-        if len(self.distortion) not in _MODELS:
-            raise InputError(
-                f"camera {self.name!r}: {len(self.distortion)} distortion coefficients have no name in the message; "
-                f"calibrate with one of {tuple(_MODELS)}"
-            )
-        calibration = CameraCalibration(
-            frame_id=self.name, width=self.width_px, height=self.height_px, D=self.distortion, K=self.matrix.ravel()
-        )
-        calibration.distortion_model = _MODELS[len(self.distortion)]
-        calibration.R.extend(np.eye(3).ravel())
-        calibration.P.extend(np.column_stack([self.matrix, np.zeros(3)]).ravel())
-        pose = FrameTransform(parent_frame_id=world_frame, child_frame_id=self.name)
-        pose.translation.x, pose.translation.y, pose.translation.z = self.position
-        quaternion = Rotation.from_matrix(self.camera_from_world[:3, :3].T).as_quat()
-        pose.rotation.x, pose.rotation.y, pose.rotation.z, pose.rotation.w = quaternion
-        return calibration, pose
-
-    @classmethod
-    def from_foxglove(cls, calibration: CameraCalibration, pose: FrameTransform) -> CalibratedCamera:
-        """The camera of two standard messages, `pose` being its pose in the world. Raises InputError."""
-        from scipy.spatial.transform import Rotation
-
-        if calibration.D and calibration.distortion_model not in _MODELS.values():
-            raise InputError(
-                f"camera {calibration.frame_id!r}: distortion model {calibration.distortion_model!r} found, "
-                f"one of {sorted(set(_MODELS.values()))} expected"
-            )
-        if len(calibration.K) != 9:
-            raise InputError(f"camera {calibration.frame_id!r}: {len(calibration.K)} numbers in K found, 9 expected")
-        turn, shift = pose.rotation, pose.translation
-        quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
-        if not 0.99 < np.linalg.norm(quaternion) < 1.01:
-            raise InputError(
-                f"camera {calibration.frame_id!r}: rotation {quaternion.tolist()} is not a unit quaternion"
-            )
-        camera_from_world = np.eye(4)
-        camera_from_world[:3, :3] = Rotation.from_quat(quaternion).as_matrix().T
-        camera_from_world[:3, 3] = -camera_from_world[:3, :3] @ [shift.x, shift.y, shift.z]
-        matrix, lens = np.reshape(calibration.K, (3, 3)), np.array(calibration.D)
-        return cls(calibration.frame_id, calibration.width, calibration.height, matrix, lens, camera_from_world)
 
 
 def write_cameras(path: Path, cameras: Sequence[CalibratedCamera]) -> None:

@@ -5,8 +5,6 @@ the edge the hand goes straight, to one well above it goes over the edge, and in
 to the other. A polynomial follows such a change badly, a grid only with many lines.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from paramove.documents import Floats
@@ -18,14 +16,6 @@ EDGE_WIDTH = 0.06
 DETOUR = 0.20
 SHARED_DEVIATION, SENSOR_DEVIATION = 0.006, 0.001
 N_FRAMES = 100
-
-
-@dataclass(frozen=True)
-class NonlinearMovements:
-    """Sequences (T_k, 6), m: x, y, z of hand and elbow; theta (K, 1), m: the height of the target."""
-
-    sequences: list[Floats]
-    theta: Floats
 
 
 def strongly_nonlinear_movement(height: float, rng: np.random.Generator | None = None) -> Floats:
@@ -48,11 +38,3 @@ def strongly_nonlinear_movement(height: float, rng: np.random.Generator | None =
         movement += shared[0] + np.outer(out, shared[1]) + np.outer(bend, shared[2])
         movement += SENSOR_DEVIATION * rng.standard_normal(movement.shape)
     return movement
-
-
-def strongly_nonlinear_movements(
-    rng: np.random.Generator, *, n_heights: int = 13, repetitions: int = 4
-) -> NonlinearMovements:
-    """Demonstrations at evenly spaced heights over -0.3 to 0.3 m."""
-    theta = np.repeat(np.linspace(-0.3, 0.3, n_heights), repetitions)
-    return NonlinearMovements([strongly_nonlinear_movement(float(one), rng) for one in theta], theta[:, None])

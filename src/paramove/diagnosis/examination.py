@@ -28,8 +28,3 @@ def examined(part: Part, machine: Machine) -> Sequence[Finding]:
         return list(CHECKS[part](machine))
     except OSError as error:
         return [Finding(part.value, Level.PROBLEM, f"cannot be checked: {error}")]
-
-
-def is_sound(findings: Iterable[Finding]) -> bool:
-    """Whether nothing is a problem; warnings are none."""
-    return all(finding.level is not Level.PROBLEM for finding in findings)

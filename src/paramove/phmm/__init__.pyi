@@ -7,6 +7,7 @@ from .estimates import ParameterEstimate as ParameterEstimate
 from .examining import has_p_values as has_p_values
 from .grid import ParameterGrid as ParameterGrid
 from .interpolative import InterpolativePHMM as InterpolativePHMM
+from .interpolative import synchronised as synchronised
 from .model_cache import cached_model as cached_model
 from .model_cache import stored_model as stored_model
 from .network.model import NeuralPHMM as NeuralPHMM
@@ -18,4 +19,3 @@ from .polynomial import LinearPHMM as LinearPHMM
 from .polynomial import PolynomialPHMM as PolynomialPHMM
 from .polynomial import QuadraticPHMM as QuadraticPHMM
 from .storage import ModelFileError as ModelFileError
-from .synchronisation import synchronised as synchronised

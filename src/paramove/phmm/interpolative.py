@@ -1,4 +1,7 @@
-"""The interpolative parametric HMM: multilinear interpolation of synchronised local HMMs on a grid (thesis 3.4)."""
+"""The interpolative parametric HMM: multilinear interpolation of synchronised local HMMs on a grid (thesis 3.4).
+
+States of all local HMMs model the same part of the movement (3.4.1).
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.documents import Floats, Ints
-from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
+from paramove.hmm import (
+    LeftRightHMM,
+    Parameters,
+    Statistics,
+    TrainingOptions,
+    covariances_of,
+    durations_of,
+    regularisation_at,
+    root_mean_deviation,
+)
 from paramove.phmm import interpolation_kernels
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.estimates import ParameterEstimate
@@ -19,7 +31,47 @@ from paramove.phmm.grid import ParameterGrid
 from paramove.phmm.local_models import check_local_models
 from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import TrainingData
-from paramove.phmm.synchronisation import synchronised
+
+AFTER_ANNEALING = 10**6
+
+
+def synchronised(
+    global_parameters: Parameters, groups: Sequence[Sequence[Floats]], options: TrainingOptions, iterations: int
+) -> list[Parameters]:
+    """One local model per group of sequences, aligned by the global model.
+
+    The first E-step uses the global model's responsibilities and gives the means (3.7), which are then fixed; further
+    steps refine covariances and durations. Each covariance is shrunk to the mean of its state over all groups (few
+    frames per state make a full covariance singular).
+    """
+    first = [Statistics.gathered(global_parameters, group) for group in groups]
+    means = [statistics.means() for statistics in first]  # Equation (3.7)
+    scale = root_mean_deviation([sequence for group in groups for sequence in group])
+    local = _refined(first, means, global_parameters.d_min, options, scale)
+    for _ in range(iterations - 1):
+        gathered = [Statistics.gathered(one, group) for one, group in zip(local, groups, strict=True)]
+        local = _refined(gathered, means, global_parameters.d_min, options, scale)
+    return local
+
+
+def _refined(
+    gathered: Sequence[Statistics], means: Sequence[Floats], d_min: int, options: TrainingOptions, scale: float
+) -> list[Parameters]:
+    scatters = [one.scatter(mean) for one, mean in zip(gathered, means, strict=True)]
+    weights = [one.weight for one in gathered]
+    # Broadcast over states: the target of state i is the mean of state i over the groups.
+    target = np.sum(scatters, axis=0) / np.sum(weights, axis=0)[:, None, None]
+    regularisation = regularisation_at(AFTER_ANNEALING, options, scale, target)
+    return [
+        Parameters(
+            mean,
+            covariances_of(scatter, weight, regularisation),
+            durations_of(one.durations, d_min, options.duration_pseudocount),
+            d_min,
+        )
+        for one, mean, scatter, weight in zip(gathered, means, scatters, weights, strict=True)
+    ]
+
 
 REMEDY = "demonstrate every point of a grid, or train a QuadraticPHMM, which needs none"
 SEARCH_TOLERANCE = 1e-7

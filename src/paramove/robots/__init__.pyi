@@ -8,7 +8,7 @@ from .description import RobotFolder as RobotFolder
 from .joint_units import INT16_RANGE as INT16_RANGE
 from .joint_units import JointRangeError as JointRangeError
 from .joint_units import JointUnits as JointUnits
-from .out_of_reach import OutOfReachError as OutOfReachError
+from .planar_arm import OutOfReachError as OutOfReachError
 from .planar_arm import PlanarArm as PlanarArm
 from .pose_points import ARM_BASE as ARM_BASE
 from .pose_points import POINT_NAMES as POINT_NAMES

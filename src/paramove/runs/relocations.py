@@ -93,10 +93,6 @@ class Motion:
     joints: tuple[str, ...]
     phases: dict[str, float]
 
-    def angles_at(self, time_s: float) -> Floats:
-        """Planned angles [J] at a time along the trajectory."""
-        return np.array([np.interp(time_s, self.times, column) for column in self.angles.T])
-
     def middle_of(self, phase: str) -> float | None:
         """Middle of a phase along the trajectory, s; None if it has none or did not get there."""
         if phase not in self.phases:

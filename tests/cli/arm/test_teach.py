@@ -14,7 +14,7 @@ from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.main import build
 from paramove.demonstrations import DemonstrationSet
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
+from paramove.robots.dynamixel.arm.gravity_compensated_arm import TorqueOffArm
 from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration, CalibratedBus, JointCalibration
 from paramove.robots.dynamixel.calibration.path import calibration_path
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, koch_servos
@@ -153,7 +153,7 @@ def test_an_arm_that_has_to_be_calibrated_is(desk):
 
 
 def test_a_servo_that_falls_silent_ends_it_and_loses_nothing(desk, monkeypatch):
-    monkeypatch.setattr("paramove.robots.dynamixel.arm.torque_off_arm.GIVES_UP", 3)
+    monkeypatch.setattr("paramove.robots.dynamixel.arm.gravity_compensated_arm.GIVES_UP", 3)
     desk.calibrate()
 
     def unplug():

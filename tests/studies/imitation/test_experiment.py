@@ -15,7 +15,7 @@ from paramove.demonstrations.reaching import reaching_grid_demonstrations
 from paramove.documents import exit_codes
 from paramove.hmm import TrainingOptions
 from paramove.hmm.sequences import resample
-from paramove.phmm.synchronisation import synchronised
+from paramove.phmm.interpolative import synchronised
 from studies.__main__ import app
 from studies.imitation.experiment import (
     CENTRE,

@@ -1,11 +1,11 @@
 from .arm.driven_arm import DrivenArm as DrivenArm
 from .arm.gravity_compensated_arm import GravityCompensatedArm as GravityCompensatedArm
+from .arm.gravity_compensated_arm import TorqueOffArm as TorqueOffArm
 from .arm.servo_arm import Timeouts as Timeouts
 from .arm.servo_loop import LoopSettings as LoopSettings
 from .arm.setup import ServoArmSetup as ServoArmSetup
 from .arm.setup import joint_servos as joint_servos
 from .arm.setup import servo_port as servo_port
-from .arm.torque_off_arm import TorqueOffArm as TorqueOffArm
 from .bus.bench import BusBench as BusBench
 from .bus.bench import bench_bus as bench_bus
 from .bus.bench import latency_timer_ms as latency_timer_ms

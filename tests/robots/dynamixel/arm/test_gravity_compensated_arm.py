@@ -6,8 +6,7 @@ import pytest
 
 from dynamixel_emulator.memory import TRIPPED
 from paramove.documents.input_error import InputError
-from paramove.robots.dynamixel.arm.gravity_compensated_arm import ArmWeight, GravityCompensatedArm
-from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
+from paramove.robots.dynamixel.arm.gravity_compensated_arm import ArmWeight, GravityCompensatedArm, TorqueOffArm
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from sim.emulated_arm import EmulatedArm

@@ -7,9 +7,9 @@ import pytest
 
 from dynamixel_emulator.emulator import DynamixelEmulator
 from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.arm.gravity_compensated_arm import TorqueOffArm
 from paramove.robots.dynamixel.arm.servo_arm import ServoArm
 from paramove.robots.dynamixel.arm.setup import joint_servos, servo_port
-from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
 from paramove.robots.dynamixel.bus.position_watch import NOISE, PositionWatch
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_models import XL430_W250

@@ -1,4 +1,4 @@
-"""An arm of Dynamixel servos whose currents carry its own weight, so that a hand leads it without lifting it."""
+"""Arms of Dynamixel servos that a person moves: without torque, or with currents that carry the arm's own weight."""
 
 from __future__ import annotations
 
@@ -10,10 +10,69 @@ import numpy as np
 from paramove.documents import Floats, InputError
 from paramove.robots import RobotDescription
 from paramove.robots.dynamixel.arm.servo_arm import WATCHDOG_UNIT_S
-from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
-from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError
-from paramove.robots.dynamixel.bus.servo_models import CURRENT_MODE, model_named
+from paramove.robots.dynamixel.bus.position_watch import POSITION, PositionWatch
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError, ServoTimeoutError
+from paramove.robots.dynamixel.bus.servo_models import CURRENT_MODE, PULSES_PER_TURN, model_named
 from paramove.robots.dynamixel.bus.servo_port import PortLostError
+
+GIVES_UP = 25
+"""Readings in a row without a reply of a servo."""
+
+
+class TorqueOffArm:
+    """`release` its servos, then read their positions.
+
+    Args:
+        chain: At the arm's baud rate.
+        description: Of an arm with servos; its units are those of this very arm.
+
+    `release` and `measured` raise PortLostError and ServoError.
+    """
+
+    def __init__(self, chain: ServoChain, description: RobotDescription) -> None:
+        self._chain = chain
+        self._joints, self._numbers = description.joint_names, description.servo_ids
+        self._models = [model_named(motor) for motor in description.motors]
+        self._watch = PositionWatch(dict(zip(self._numbers, self._models, strict=True)))
+        self._units = description.units
+        middle = 0.5 * (description.units.lower + description.units.upper)
+        self._middle = self._units.zero_counts + self._units.counts_per_rad * middle
+        self._misses = 0
+
+    def release(self) -> None:
+        """Torque off; who holds the arm carries its weight from now on."""
+        for number, model in zip(self._numbers, self._models, strict=True):
+            self._chain.write(number, model.registers["Torque Enable"], 0)
+
+    def put_down(self) -> tuple[str, ...]:
+        """Put the arm in its final state; without torque nothing is to be done.
+
+        Returns:
+            What failed, for people.
+        """
+        return ()
+
+    def measured(self) -> tuple[int, Floats] | None:
+        """When, ns of the monotonic clock, and the angles of all joints, [J], rad.
+
+        None while a reply is missing, or has a position that cannot be true.
+
+        Raises:
+            ServoTimeoutError: A servo has not replied for long.
+        """
+        answers = self._watch.read(self._chain)
+        missing = [number for number in self._numbers if number not in answers]
+        self._misses = self._misses + 1 if missing else 0
+        if self._misses > GIVES_UP:
+            raise ServoTimeoutError(missing[0], f"servo {missing[0]} no longer answers: check its cable and its power")
+        if missing:
+            return None
+        positions = np.array([answers[number].values[POSITION] for number in self._numbers], dtype=np.float64)
+        # A servo in the extended mode may begin in another turn.
+        counts = positions - PULSES_PER_TURN * np.round((positions - self._middle) / PULSES_PER_TURN)
+        at_ns = max(answers[number].at_ns for number in self._numbers)
+        return at_ns, (counts - self._units.zero_counts) / self._units.counts_per_rad
+
 
 WATCHDOG_S = 0.2
 """A servo without data for so long switches its current off by itself."""
