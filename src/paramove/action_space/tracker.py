@@ -29,6 +29,11 @@ from paramove.action_space.vocabulary import PLACE_SIZE, ActionModel, Vocabulary
 from paramove.documents import Floats, InputError, Ints
 from paramove.observation import HAND, Presence
 
+MIN_CONCENTRATION = 0.8
+"""Length of the mean of the progress as a direction, 0 (scattered over all of the action) to 1."""
+JUMP = 0.25
+"""Of the progress, beyond what the time between two frames explains."""
+Measure = Callable[[Floats], Floats | None]
 CONTACT = 0.8
 """Fraction of the largest dependence of the hand on a target from which on the hand is at that target."""
 
@@ -76,13 +81,6 @@ def _at_target(model: ActionModel, theta: Floats, tau: Floats) -> tuple[NDArray[
     which = dependence.argmax(axis=0)
     places = theta[:, : model.n_parameters].reshape(len(theta), -1, PLACE_SIZE)
     return dependence.max(axis=0) >= CONTACT, places[np.arange(len(theta)), which]
-
-
-MIN_CONCENTRATION = 0.8
-"""Length of the mean of the progress as a direction, 0 (scattered over all of the action) to 1."""
-JUMP = 0.25
-"""Of the progress, beyond what the time between two frames explains."""
-Measure = Callable[[Floats], Floats | None]
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,10 @@ from paramove.documents import Floats, Ints
 from paramove.hmm.compilation import compiled, compiled_arithmetic
 from paramove.hmm.vector_functions import UNDERFLOW, add_multiple, dot, exp_of_negative, log_of_one_plus
 
+DENSE_UNDERFLOW = -700.0
+MIN_POSTERIOR = 1e-100
+SMALLEST_SUM = 1e-200  # below it terms that were lost to underflow could count
+
 
 @compiled
 def best_path(
@@ -40,11 +44,6 @@ def best_path(
     for t in range(n_frames - 1, 0, -1):
         states[t - 1] = choice[t, states[t]]
     return float(value), states
-
-
-DENSE_UNDERFLOW = -700.0
-MIN_POSTERIOR = 1e-100
-SMALLEST_SUM = 1e-200  # below it terms that were lost to underflow could count
 
 
 @compiled

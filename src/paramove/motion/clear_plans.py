@@ -23,6 +23,14 @@ from paramove.motion.relocation import RelocationPlanner
 from paramove.motion.timing import minimum_jerk
 from paramove.robots import ArmKinematics
 
+MIN_CLEARANCE = 0.005  # m, of planned paths from table, body and standing objects
+_HIGHER_ENTRY = 0.065
+_HIGHER_CARRY = np.array([0.0, 0.0, 0.012])
+_BEHIND_ROW = 0.004
+_MIN_TO_STANDING = 0.003  # m, where no alternative keeps more: positions of standing objects are known to about 2 mm
+_HALF_OPEN = 0.45  # ξ; an object of 20 mm is released at less than half of it
+NOT_AT_BASE = "the arm is not at its base pose; send a goal of kind REST first"
+_HIGH = 0.055  # m above the working plane's grasp height: an empty hand there has left the objects below it
 LIMIT_FRACTION = 0.5  # of the operating velocity and acceleration: people do not expect this motion
 MIN_DURATION_S = 0.5
 JOINED_WITHIN = np.deg2rad(0.01)
@@ -78,16 +86,6 @@ def joined(first: PlannedMotion, then: PlannedMotion) -> PlannedMotion:
         phases=(*first.phases, *((name, later + start) for name, start in then.phases)),
         elbow_turn=max(first.elbow_turn, then.elbow_turn),
     )
-
-
-MIN_CLEARANCE = 0.005  # m, of planned paths from table, body and standing objects
-_HIGHER_ENTRY = 0.065
-_HIGHER_CARRY = np.array([0.0, 0.0, 0.012])
-_BEHIND_ROW = 0.004
-_MIN_TO_STANDING = 0.003  # m, where no alternative keeps more: positions of standing objects are known to about 2 mm
-_HALF_OPEN = 0.45  # ξ; an object of 20 mm is released at less than half of it
-NOT_AT_BASE = "the arm is not at its base pose; send a goal of kind REST first"
-_HIGH = 0.055  # m above the working plane's grasp height: an empty hand there has left the objects below it
 
 
 class _Alternative(Protocol):

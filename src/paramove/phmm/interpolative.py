@@ -32,6 +32,11 @@ from paramove.phmm.local_models import check_local_models
 from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import TrainingData
 
+REMEDY = "demonstrate every point of a grid, or train a QuadraticPHMM, which needs none"
+SEARCH_TOLERANCE = 1e-7
+"""Relative change of the log-likelihood at which the search within a region ends."""
+CONTRADICTED = 1e10
+"""Minus the log-likelihood, for the search, where the durations contradict the sequence."""
 AFTER_ANNEALING = 10**6
 
 
@@ -71,13 +76,6 @@ def _refined(
         )
         for one, mean, scatter, weight in zip(gathered, means, scatters, weights, strict=True)
     ]
-
-
-REMEDY = "demonstrate every point of a grid, or train a QuadraticPHMM, which needs none"
-SEARCH_TOLERANCE = 1e-7
-"""Relative change of the log-likelihood at which the search within a region ends."""
-CONTRADICTED = 1e10
-"""Minus the log-likelihood, for the search, where the durations contradict the sequence."""
 
 
 class InterpolativePHMM(ExaminingPHMM):

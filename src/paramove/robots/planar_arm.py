@@ -13,6 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.documents import Floats
 
+PITCHES = np.linspace(-np.pi, np.pi, 720, endpoint=False)
+"""Searched for a reachable pitch, rad."""
+PITCH_TOLERANCE = 1e-6
+POINTS_TO_SHOULDER = 60
+"""Between a point out of reach and the shoulder, searched for the nearest that is reachable."""
+ROUNDING = 1e-9
+"""Tolerance, rad or relative: rounding may carry an angle beyond its limit or a point beyond the reach."""
+
 
 class OutOfReachError(ValueError):
     """A pose that an arm cannot take; the message names the cause and the nearest that is reachable.
@@ -39,14 +47,6 @@ def describe_miss(names: tuple[str, ...], lower: Floats, upper: Floats, solution
 
 
 Numbers = Floats | np.float64
-
-PITCHES = np.linspace(-np.pi, np.pi, 720, endpoint=False)
-"""Searched for a reachable pitch, rad."""
-PITCH_TOLERANCE = 1e-6
-POINTS_TO_SHOULDER = 60
-"""Between a point out of reach and the shoulder, searched for the nearest that is reachable."""
-ROUNDING = 1e-9
-"""Tolerance, rad or relative: rounding may carry an angle beyond its limit or a point beyond the reach."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,10 @@ from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError, Se
 from paramove.robots.dynamixel.bus.servo_models import CURRENT_MODE, PULSES_PER_TURN, model_named
 from paramove.robots.dynamixel.bus.servo_port import PortLostError
 
+WATCHDOG_S = 0.2
+"""A servo without data for so long switches its current off by itself."""
+CURRENT_FRACTION = 1.0 / 3.0
+"""Of a servo's current limit: the maximum of a goal."""
 GIVES_UP = 25
 """Readings in a row without a reply of a servo."""
 
@@ -72,12 +76,6 @@ class TorqueOffArm:
         counts = positions - PULSES_PER_TURN * np.round((positions - self._middle) / PULSES_PER_TURN)
         at_ns = max(answers[number].at_ns for number in self._numbers)
         return at_ns, (counts - self._units.zero_counts) / self._units.counts_per_rad
-
-
-WATCHDOG_S = 0.2
-"""A servo without data for so long switches its current off by itself."""
-CURRENT_FRACTION = 1.0 / 3.0
-"""Of a servo's current limit: the maximum of a goal."""
 
 
 class ArmWeight:
