@@ -216,21 +216,22 @@ def imitation(out: Path) -> dict[str, Any]:
 
 
 def real_images(out: Path) -> dict[str, Any]:
-    """Ranges over the seeds of each replay."""
+    """Means over the seeds of each replay."""
     found = load(out / "numbers.json")
-    parts = (
-        ("short", "frames 6-9", "median_px"),
-        ("long", "frames 32-50", "median_px"),
-        ("tip", "frames 32-50", "median_of_tip_px"),
-        ("far", "frames 32-50", "far_frames"),
-    )
     rows = []
-    for name in sorted(found["cases"], key=lambda name: name != found["judged"]):
-        runs = found["cases"][name]["runs"]
-        values = {key: [run[frames][what] for run in runs] for key, frames, what in parts}
-        rows.append({"name": name, **{key: [min(each), max(each)] for key, each in values.items()}})
-    resting = {key: [found["hand left on the knee"][frames][what]] * 2 for key, frames, what in parts}
-    return {"rows": [*rows, {"name": "a hand left on the knee", **resting}]}
+    for name, runs in found["cases"].items():
+        row: dict[str, Any] = {"name": name}
+        for frames, short in (("6-9", "short"), ("32-50", "long"), ("43-49", "swing"), ("all", "all")):
+            frames = "all frames" if frames == "all" else f"frames {frames}"
+            for number, key in (
+                ("median_px", "px"), ("far_frames", "far"), ("lost_frames", "lost"), ("hand_cm", "hand"),
+                ("from_shoulder_cm", "relative"), ("direction_deg", "direction"),
+            ):  # fmt: skip
+                values = [run[frames][number] for run in runs]
+                row[f"{short}_{key}"] = "–" if None in values else f"{sum(values) / len(values):.1f}"
+        rows.append(row)
+    goals = [{**goal, "met": "yes" if goal["met"] else "no"} for goal in found["goals"]]
+    return {"rows": rows, "goals": goals}
 
 
 COMPARED_METHODS = {

@@ -2,17 +2,21 @@
 
 Subscribes  camera_1/image, camera_2/image,
             camera_3/image, camera_4/image    foxglove.CompressedImage    15 Hz   camera_1 … camera_4
+            camera_1/key_points, camera_2/key_points, camera_3/key_points, camera_4/key_points   BodyKeyPoints   15 Hz
 Publishes   action/estimate                   ActionEstimate              15 Hz   table, or that of `table_place`
             human/arm_pose                    ArmPose                     15 Hz   table
             action/outline                    foxglove.ImageAnnotations   15 Hz   camera_1
             action/scene                      foxglove.SceneUpdate        15 Hz   table, or that of `table_place`
 """
 
-from paramove.action_space import TrackingSetup, arm_pose_message, estimate_message, outline_message, scene_message
+from collections.abc import Iterable
+
+from paramove.action_space import TrackedState, TrackingSetup, messages_of
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.cameras import FrameError, decode
+from paramove.observation import key_points_from
 
-SUBSCRIBES = topics.CAMERA_IMAGES
+SUBSCRIBES = (*topics.CAMERA_IMAGES, *topics.CAMERA_KEY_POINTS)
 PUBLISHES = (topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)
 
 
@@ -30,18 +34,20 @@ def run(bus: Bus, config: Config) -> None:
     bus.ready(detail)
     reported = tracker.problem_kind
     for event in bus.events(*SUBSCRIBES, tick=True):
+        states: Iterable[TrackedState] = ()
         if isinstance(event, Tick):
-            tracker.tick(event.now_ns)
-        elif (camera := event.topic.name.removesuffix("/image")) in tracker.cameras:
+            states = tracker.tick(event.now_ns)
+        elif (camera := event.topic.name.partition("/")[0]) in tracker.cameras:
             try:
-                for estimate in tracker.see(camera, event.captured_ns, decode(event.message)):
-                    at = estimate.captured_ns
-                    bus.publish(topics.ACTION_ESTIMATE, estimate_message(estimate, names, config.particles, place), at)
-                    bus.publish(topics.HUMAN_ARM_POSE, arm_pose_message(estimate), at)
-                    bus.publish(topics.ACTION_OUTLINE, outline_message(estimate), at)
-                    bus.publish(topics.ACTION_SCENE, scene_message(estimate, place), at)
+                if event.topic in topics.CAMERA_KEY_POINTS:
+                    states = tracker.see_key_points(camera, event.captured_ns, key_points_from(event.message))
+                else:
+                    states = tracker.see(camera, event.captured_ns, decode(event.message))
             except FrameError as error:
                 tracker.add_unreadable(camera, event.captured_ns, str(error))
+        for state in states:
+            for topic, message in zip(PUBLISHES, messages_of(state, names, config.particles, place), strict=True):
+                bus.publish(topic, message, state.captured_ns)
         trouble = tracker.trouble()
         if tracker.problem_kind != reported:
             reported = tracker.problem_kind

@@ -5,7 +5,7 @@ The true position of the hand is not used here. Estimates are read from the mess
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,7 +29,7 @@ from paramove.cameras import CalibratedCamera, EndOfFrames, FrameChecks, decode,
 from paramove.documents import Floats, InputError
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.arm_pose_pb2 import ArmPose
-from paramove.observation import ArmObserver
+from paramove.observation import ArmObserver, BodyKeyPoints, PoseNetwork, key_points_from, key_points_message
 from studies.real_images import seated_person
 from studies.real_images.pointing_model import NAME, pointing_action
 
@@ -60,19 +60,23 @@ class ReplayedEstimate:
 
 
 def replayed(
-    folder: Path, *, rate_hz: float = RATE_HZ, retargeted: float = RETARGETED, seed: int = 0, models: Path | None = None
-) -> list[ReplayedEstimate]:
+    folder: Path, key_points: Sequence[BodyKeyPoints] = (), *, rate_hz: float = RATE_HZ, seed: int = 0,
+    models: Path | None = None,
+) -> list[ReplayedEstimate]:  # fmt: skip
     """All frames of the recording of a folder. Raises InputError where something of it is missing.
 
     Args:
-        rate_hz: assumed pictures a second. retargeted: see `PropagationOptions`. seed: of the filter.
+        key_points: of each picture; none to track by the outline alone.
+        rate_hz: assumed pictures a second. seed: of the filter.
         models: folder of the trained model; by default the user's cache.
     """
     camera = seated_person.camera(folder)
-    tracker = video_tracker(camera, rate_hz, retargeted, seed, models)
+    tracker = video_tracker(camera, rate_hz, seed, models)
     estimates = []
     for index, image in camera_messages(folder / IMAGES, camera, rate_hz):
-        for tracked in tracker.see(CAMERA, image.timestamp.ToNanoseconds(), decode(image)):
+        at_ns = image.timestamp.ToNanoseconds()
+        states = list(tracker.see_key_points(CAMERA, at_ns, key_points[index])) if len(key_points) else []
+        for tracked in [*states, *tracker.see(CAMERA, at_ns, decode(image))]:
             estimate = estimate_message(tracked, tracker.parameter_names, PARTICLES).SerializeToString()
             pose = arm_pose_message(tracked).SerializeToString()
             outline = outline_message(tracked).SerializeToString()
@@ -80,14 +84,12 @@ def replayed(
     return estimates
 
 
-def video_tracker(
-    camera: CalibratedCamera, rate_hz: float, retargeted: float, seed: int, models: Path | None
-) -> VideoTracker:
+def video_tracker(camera: CalibratedCamera, rate_hz: float, seed: int, models: Path | None) -> VideoTracker:
     """The tracker as the node makes one: seated pointing in a loop, and directions that may slide on."""
     placement = seated_person.placement(camera)
     action = pointing_action(seated_person.SIZES, seated_person.resting_pose(camera), placement, models)
     options = TrackerOptions(
-        filter=FilterOptions(n_particles=PARTICLES), propagation=PropagationOptions(retargeted=retargeted)
+        filter=FilterOptions(n_particles=PARTICLES), propagation=PropagationOptions(retargeted=RETARGETED)
     )
     tracker = ActionTracker(Vocabulary([action]), Grammar.loop(NAME), placement, options, seed)
     return VideoTracker(tracker, ArmObserver(seated_person.SIZES, [camera]), [camera], 1.0 / rate_hz)
@@ -110,6 +112,12 @@ def camera_messages(pictures: Path, camera: CalibratedCamera, rate_hz: float) ->
         raise InputError(f"{pictures}: {error}") from error
     finally:
         source.close()
+
+
+def detected_key_points(folder: Path, network: PoseNetwork) -> list[BodyKeyPoints]:
+    """What the network detects in each picture, as a subscriber receives it. Raises InputError."""
+    images = camera_messages(folder / IMAGES, seated_person.camera(folder), RATE_HZ)
+    return [key_points_from(key_points_message(network.detect(decode(image)), 0)) for _, image in images]
 
 
 def _received(frame: int, estimate_data: bytes, pose_data: bytes, outline_data: bytes) -> ReplayedEstimate:

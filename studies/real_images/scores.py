@@ -1,4 +1,4 @@
-"""How far the estimated hand is from the reference, in the image."""
+"""How far the estimated hand is from the reference, in the image and in space."""
 
 from __future__ import annotations
 
@@ -7,20 +7,41 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from paramove.cameras import CalibratedCamera
 from paramove.documents import Floats, InputError, Ints, read_arrays
-from paramove.observation import fitted_poses
+from paramove.observation import BodyKeyPoints
+from studies.real_images import seated_person
 from studies.real_images.replay import ReplayedEstimate
 from studies.real_images.seated_person import SIZES
 
 REFERENCE = "hand_reference.npz"
-GOAL_PX = 25.0
-RANGES = {"frames 6-9": (6, 9), "frames 32-50": (32, 50)}
-"""First and last frame: the arm points to its right, and slides across the body and up."""
+DEPTH_IMAGES = "depth"
+RANGES = {"frames 6-9": (6, 9), "frames 32-50": (32, 50), "frames 43-49": (43, 49)}
+"""First and last frame: the arm points to its right; it slides across the body and up; within that it swings past the
+line of sight."""
 FAR_PX = 50.0
+PATCH_PX = 3
+FLESH_M = 0.05
+"""The joint of the shoulder lies so far behind the surface of the sleeve."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What is compared with.
+
+    Attributes:
+        pixels: Middle of the hand's skin in each frame, detected by its colour, (T, 2), px.
+        hand: The same in space, on the surface, (T, 3), m, in the camera's frame.
+        shoulder: The network's shoulder in the depth image, behind the sleeve, (T, 3), m, likewise; NaN without depth.
+    """
+
+    pixels: Floats
+    hand: Floats
+    shoulder: Floats
 
 
 @dataclass(frozen=True)
@@ -28,46 +49,69 @@ class Distances:
     """Of one replay, for each frame that was tracked.
 
     Attributes:
-        frames: numbers, (T,). middle, tip: distance of the middle of the hand, and of the tip of the index finger,
-            from the reference, (T,), px.
-        lost: frames in which the tracker reported the arm as lost, (T,).
+        frames: Numbers, (T,).
+        pixels: Distance of the middle of the hand from the reference, (T,), px.
+        hand, from_shoulder: The same in space, of its position and of its position from the shoulder, (T,), m.
+        direction: Angle between the directions from shoulder to hand, (T,), rad.
+        lost: Frames in which the tracker reported the arm as lost, (T,).
     """
 
     frames: Ints
-    middle: Floats
-    tip: Floats
+    pixels: Floats
+    hand: Floats
+    from_shoulder: Floats
+    direction: Floats
     lost: NDArray[np.bool_]
 
-    def numbers(self) -> dict[str, Any]:
-        """Medians of the ranges and of all frames, and in how many frames of each the hand is far off."""
+    def numbers(self, all_frames: int) -> dict[str, Any]:
+        """Medians in each range and in all frames, and how many frames of each are far off or lost."""
         numbers: dict[str, Any] = {}
-        for name, (first, last) in {**RANGES, "all frames": (0, int(self.frames.max(initial=0)))}.items():
+        for name, (first, last) in {**RANGES, "all frames": (0, all_frames - 1)}.items():
             rows = (self.frames >= first) & (self.frames <= last)
-            missing = last - first + 1 - int(rows.sum())
-            padding = np.full(missing, np.inf)  # a frame without an estimate is far off
-            middle, tip = np.append(self.middle[rows], padding), np.append(self.tip[rows], padding)
+            missing = np.full(last - first + 1 - int(rows.sum()), np.inf)  # a frame without an estimate is far off
+            pixels, hand, relative, direction = (
+                np.append(one[rows], missing) for one in (self.pixels, self.hand, self.from_shoulder, self.direction)
+            )
             numbers[name] = {
-                "median_px": _finite(np.median(middle)),
-                "median_of_tip_px": _finite(np.median(tip)),
-                "frames": last - first + 1,
-                "far_frames": int((middle > FAR_PX).sum()),
-                "frames_said_to_be_lost": int(self.lost[rows].sum()),
+                "median_px": _finite(np.median(pixels)),
+                "far_frames": int((pixels > FAR_PX).sum()),
+                "lost_frames": int(self.lost[rows].sum()) + len(missing),
+                "hand_cm": _finite(100.0 * np.median(hand)),
+                "from_shoulder_cm": _finite(100.0 * np.median(relative)),
+                "direction_deg": _finite(np.degrees(np.median(direction))),
             }
         return numbers
 
 
-def read_reference(folder: Path) -> Floats:
-    """Middle of the hand's skin in each frame, (T, 2), px. Raises InputError."""
+def read_reference(folder: Path, camera: CalibratedCamera, key_points: Sequence[BodyKeyPoints]) -> Reference:
+    """Of a recording; the shoulder by the key points of each frame. Raises InputError."""
     path = folder / REFERENCE
     try:
-        positions = np.asarray(read_arrays(path, "reference of where the hand is seen")["uv"], dtype=np.float64)
+        arrays = read_arrays(path, "reference of where the hand is seen")
+        pixels, hand = (np.asarray(arrays[name], dtype=np.float64) for name in ("uv", "xyz_m"))
     except (ValueError, KeyError, TypeError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"{path}: {error}; an array uv (frames, 2) expected") from error
-    if positions.ndim != 2 or positions.shape[1] != 2:
-        raise InputError(f"{path}: uv of shape {positions.shape} found, (frames, 2) expected")
-    return positions
+        raise InputError(f"{path}: {error}; arrays uv (frames, 2) and xyz_m (frames, 3) expected") from error
+    if pixels.ndim != 2 or pixels.shape[1] != 2 or hand.shape != (len(pixels), 3):
+        raise InputError(
+            f"{path}: uv of shape {pixels.shape} and xyz_m {hand.shape} found, (frames, 2) and (frames, 3) expected"
+        )
+    shoulders = [_shoulder(folder, camera, frame, points) for frame, points in enumerate(key_points[: len(pixels)])]
+    return Reference(pixels, hand, np.array([*shoulders, *np.full((len(pixels) - len(shoulders), 3), np.nan)]))
+
+
+def _shoulder(folder: Path, camera: CalibratedCamera, frame: int, points: BodyKeyPoints) -> Floats:
+    depth = cv2.imread(str(folder / DEPTH_IMAGES / f"{frame:05d}.png"), cv2.IMREAD_UNCHANGED)
+    at = points.positions[0, 0]
+    if depth is None or not np.isfinite(at).all():
+        return np.full(3, np.nan)
+    x, y = at.astype(int)
+    patch = depth[max(y - PATCH_PX, 0) : y + PATCH_PX + 1, max(x - PATCH_PX, 0) : x + PATCH_PX + 1]
+    if not patch.any():
+        return np.full(3, np.nan)
+    ray = np.linalg.solve(camera.matrix, np.array([*at, 1.0]))
+    return np.asarray((np.median(patch[patch > 0]) / 1000.0 + FLESH_M) * ray)
 
 
 def middle_of_hand(poses: ArrayLike) -> Floats:
@@ -75,26 +119,39 @@ def middle_of_hand(poses: ArrayLike) -> Floats:
 
     The reference is the middle of the visible skin, not the fingertip.
     """
-    fitted = fitted_poses(np.atleast_2d(np.asarray(poses, dtype=np.float64)), SIZES)
+    points = np.atleast_2d(np.asarray(poses, dtype=np.float64))
     fraction = (SIZES.forearm + 0.5 * SIZES.hand) / SIZES.lower_arm
-    return np.asarray(fitted[:, 3:6] + fraction * (fitted[:, 6:9] - fitted[:, 3:6]))
+    return np.asarray(points[:, 3:6] + fraction * (points[:, 6:9] - points[:, 3:6]))
 
 
-def distances(estimates: Sequence[ReplayedEstimate], reference: Floats, camera: CalibratedCamera) -> Distances:
+def distances(estimates: Sequence[ReplayedEstimate], reference: Reference, camera: CalibratedCamera) -> Distances:
     """Of the estimated hand from the reference. Raises InputError where they are not of the same frames."""
     frames = np.array([one.frame for one in estimates], dtype=np.int64)
-    if len(frames) == 0 or frames.max() >= len(reference):
-        raise InputError(f"{len(reference)} frames have a reference, frames {frames.tolist()} were tracked")
+    if len(frames) == 0 or frames.max() >= len(reference.pixels):
+        raise InputError(f"{len(reference.pixels)} frames have a reference, frames {frames.tolist()} were tracked")
     poses = np.array([one.pose for one in estimates])
-    middle = np.linalg.norm(camera.project(middle_of_hand(poses)) - reference[frames], axis=1)
-    tip = np.linalg.norm(camera.project(poses[:, 6:9]) - reference[frames], axis=1)
-    return Distances(frames, middle, tip, np.array([one.lost for one in estimates]))
+    middle = middle_of_hand(poses)
+    hand, shoulder = (seated_person.in_camera(points, camera) for points in (middle, poses[:, :3]))
+    arm, true_arm = hand - shoulder, (reference.hand - reference.shoulder)[frames]
+    lengths = np.linalg.norm(arm, axis=1) * np.linalg.norm(true_arm, axis=1)
+    return Distances(
+        frames,
+        pixels=np.linalg.norm(camera.project(middle) - reference.pixels[frames], axis=1),
+        hand=np.linalg.norm(hand - reference.hand[frames], axis=1),
+        from_shoulder=np.linalg.norm(arm - true_arm, axis=1),
+        direction=np.arccos(np.clip((arm * true_arm).sum(axis=1) / lengths, -1.0, 1.0)),
+        lost=np.array([one.lost for one in estimates]),
+    )
 
 
-def is_met(runs: Sequence[dict[str, Any]]) -> bool:
-    """Whether each run, one for each seed, meets the goal in both ranges."""
-    medians = [run[name]["median_px"] for run in runs for name in RANGES]
-    return bool(medians) and all(median is not None and median <= GOAL_PX for median in medians)
+def network_alone(key_points: Sequence[BodyKeyPoints], reference: Reference) -> Distances:
+    """Of the middle of the hand as the network detects it, which is not in space."""
+    frames = np.arange(min(len(key_points), len(reference.pixels)))
+    pixels = np.array([points.positions[0, 3] for points in key_points[: len(frames)]])
+    lost = ~np.isfinite(pixels).all(axis=1)
+    off = np.where(lost, np.inf, np.linalg.norm(pixels - reference.pixels[frames], axis=1))
+    nowhere = np.full(len(frames), np.inf)
+    return Distances(frames, off, nowhere, nowhere, nowhere, lost)
 
 
 def _finite(value: np.floating[Any]) -> float | None:

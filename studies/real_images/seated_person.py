@@ -81,6 +81,11 @@ def in_world(pixel: tuple[float, float], depth: float, camera: CalibratedCamera)
     return np.asarray(turn.T @ (depth * ray - shift))
 
 
+def in_camera(points: Floats, camera: CalibratedCamera) -> Floats:
+    """Points (N, 3), m, of the world in the camera's frame."""
+    return np.asarray(points @ camera.camera_from_world[:3, :3].T + camera.camera_from_world[:3, 3])
+
+
 def _camera_from_world() -> Floats:
     up = unit(UP_IN_CAMERA)
     towards_camera = unit(np.array([0.0, 0.0, -1.0]) + up[2] * up)

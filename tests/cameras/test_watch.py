@@ -10,7 +10,7 @@ S = 1_000_000_000
 
 
 def test_nothing_is_wrong_with_images_in_time():
-    watch = CameraWatch([camera(1), camera(2)])
+    watch = CameraWatch([camera(1), camera(2)], 0.1)
     for moment in range(5):
         assert watch.accepts("camera_1", moment * S, GOOD)
         assert watch.accepts("camera_2", moment * S, GOOD)
@@ -19,7 +19,7 @@ def test_nothing_is_wrong_with_images_in_time():
 
 
 def test_silence_is_told_of_one_and_of_all_and_is_over_with_the_next_image():
-    watch = CameraWatch([camera(1), camera(2)])
+    watch = CameraWatch([camera(1), camera(2)], 0.1)
     watch.tick(0)
     watch.accepts("camera_1", 2 * S, GOOD)
     watch.tick(2 * S)
@@ -32,7 +32,7 @@ def test_silence_is_told_of_one_and_of_all_and_is_over_with_the_next_image():
 
 
 def test_a_wrong_size_is_told_until_a_right_one_comes():
-    watch = CameraWatch([camera(1)])
+    watch = CameraWatch([camera(1)], 0.1)
     assert not watch.accepts("camera_1", 0, GOOD[::2])
     assert watch.troubles() == [
         "camera_1 gives 160 x 60 px, calibrated are 160 x 120 px: set its resolution or calibrate it again"
@@ -41,3 +41,14 @@ def test_a_wrong_size_is_told_until_a_right_one_comes():
     assert watch.troubles() == ["camera_1: no picture"]
     assert watch.accepts("camera_1", 2, GOOD)
     assert watch.troubles() == []
+
+
+def test_a_slow_camera_is_reported_with_its_rate_until_it_is_fast_again():
+    watch, image = CameraWatch([camera(1)], 1.0 / 15.0), np.zeros((120, 160, 3), np.uint8)
+    at_ns = 0
+    for count, period_ns, slow in ((15, 200, False), (1, 200, True), (8, 66, False)):
+        for _ in range(count):
+            at_ns += period_ns * 1_000_000
+            watch.accepts("camera_1", at_ns, image)
+        watch.tick(at_ns)
+        assert ("camera_1 gives 5 images per second" in "".join(watch.troubles())) == slow

@@ -81,8 +81,14 @@ def test_remap_makes_two_speakers_two_topics(workspace):
     checked(workspace, "nodes:\n  a: {module: nodes.actor}\n  b: {module: nodes.actor, remaps: {speech: speech/b}}")
 
 
-def test_optional_topic_needs_no_speaker(workspace):
-    checked(workspace, "nodes:\n  ear: {module: nodes.listener, optional_topics: [speech]}")
+@pytest.mark.parametrize("topic", ["speech", "'sp*'", "'*'"])
+def test_optional_topic_needs_no_speaker(workspace, topic):
+    checked(workspace, f"nodes:\n  ear: {{module: nodes.listener, optional_topics: [{topic}]}}")
+
+
+def test_a_pattern_of_optional_topics_that_fits_none_is_an_error(workspace):
+    with pytest.raises(DocumentError, match=r"'\*/nothing'"):
+        checked(workspace, "nodes:\n  ear: {module: nodes.listener, optional_topics: [speech, '*/nothing']}")
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from .messages import arm_pose_message as arm_pose_message
 from .messages import ball_colour as ball_colour
 from .messages import certainty as certainty
 from .messages import estimate_message as estimate_message
+from .messages import messages_of as messages_of
 from .messages import outline_message as outline_message
 from .messages import scene_message as scene_message
 from .particle_filter import FilterOptions as FilterOptions

@@ -77,6 +77,14 @@ def ball_colour(certain: float) -> tuple[float, float, float]:
     return min(1.0, 2.0 * (1.0 - certain)), min(1.0, 2.0 * certain), 0.1
 
 
+def messages_of(
+    state: TrackedState, parameter_names: Mapping[str, Sequence[str]], particles: int, table: TablePose = AT_TABLE
+) -> tuple[ActionEstimate, ArmPose, ImageAnnotations, SceneUpdate]:
+    """All that is published of a state."""
+    estimate = estimate_message(state, parameter_names, particles, table)
+    return estimate, arm_pose_message(state), outline_message(state), scene_message(state, table)
+
+
 def estimate_message(
     state: TrackedState,
     parameter_names: Mapping[str, Sequence[str]],

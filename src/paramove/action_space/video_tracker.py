@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from paramove.action_space.awaited_key_points import AwaitedKeyPoints, Item
 from paramove.action_space.tracker import ActionTracker, TrackEstimate
 from paramove.cameras import AlignedViews, CalibratedCamera, CameraWatch, Views
 from paramove.documents import Floats, Image
-from paramove.observation import ArmObserver
+from paramove.observation import ArmObserver, BodyKeyPoints, KeyPointObserver
 
 MIN_SHARPNESS = 3.0
 """Grey levels per px that the strongest edges of an image reach; noise in the dark stays below 2, a lit scene is above
@@ -72,24 +73,30 @@ def compile_observer(trial: ArmObserver, camera: CalibratedCamera, poses: Floats
 
 
 class VideoTracker:
-    """Aligns the images of the cameras in time and updates the filter with them.
+    """Aligns the images of the cameras in time and updates the filter with them, and with key points if there are any.
+
+    An image waits for its key points for up to 0.15 s; without any for 1 s, nothing waits for them.
 
     Args:
         tracker: The filter.
         observer: Compares postures with images; its cameras are `cameras`.
+        key_points: Compares postures with the key points of the same cameras; by default one with default options.
         cameras: As calibrated, in the order of the observer.
         period_s: Time between two images of a camera, s.
     """
 
     def __init__(
-        self, tracker: ActionTracker, observer: ArmObserver, cameras: Sequence[CalibratedCamera], period_s: float
-    ) -> None:
+        self, tracker: ActionTracker, observer: ArmObserver, cameras: Sequence[CalibratedCamera], period_s: float,
+        key_points: KeyPointObserver | None = None,
+    ) -> None:  # fmt: skip
         self._tracker = tracker
         self._observer = observer
+        self._key_points = KeyPointObserver(observer.sizes, cameras) if key_points is None else key_points
         self._cameras = {camera.name: camera for camera in cameras}
-        self._views = AlignedViews(list(self._cameras), period_s)
+        self._awaited = {name: AwaitedKeyPoints() for name in self._cameras}
+        self._views = AlignedViews[Item](list(self._cameras), period_s)
         self._started_ns: int | None = None
-        self._watch = CameraWatch(cameras)
+        self._watch = CameraWatch(cameras, period_s)
         self._dark: list[str] = []
         self._uncertainty = ""
 
@@ -117,16 +124,26 @@ class VideoTracker:
         The background is learned when the next state is requested: an estimate does not wait for that.
         """
         if self._watch.accepts(camera, captured_ns, image):
-            for views in self._views.add(camera, captured_ns, image):
+            yield from self._with_key_points(camera, self._awaited[camera].add_image(captured_ns, image))
+
+    def see_key_points(self, camera: str, captured_ns: int, points: BodyKeyPoints) -> Iterator[TrackedState]:
+        """The states that the key points of an image complete."""
+        yield from self._with_key_points(camera, self._awaited[camera].add_points(captured_ns, points))
+
+    def _with_key_points(self, camera: str, released: Iterator[tuple[int, Item]]) -> Iterator[TrackedState]:
+        for captured_ns, item in released:
+            for views in self._views.add(camera, captured_ns, item):
                 yield from self._tracked(views)
 
     def add_unreadable(self, camera: str, captured_ns: int, why: str) -> None:
         """Reports an image that could not be decoded."""
         self._watch.reject(camera, captured_ns, why)
 
-    def tick(self, now_ns: int) -> None:
-        """Advances the time, with images or without."""
+    def tick(self, now_ns: int) -> Iterator[TrackedState]:
+        """Advances the time, with images or without; the states of images that wait no longer for key points."""
         self._watch.tick(now_ns)
+        for camera, awaited in self._awaited.items():
+            yield from self._with_key_points(camera, awaited.released(now_ns))
 
     def trouble(self) -> str:
         """Why images are not used, and what is uncertain about the arm; "" if nothing is wrong."""
@@ -139,12 +156,14 @@ class VideoTracker:
         lost = estimate is not None and estimate.lost
         return (*self._watch.troubles(), *self._dark, *(("lost" if lost else "unsure",) if self._uncertainty else ()))
 
-    def _tracked(self, views: Views) -> Iterator[TrackedState]:
+    def _tracked(self, views: Views[Item]) -> Iterator[TrackedState]:
         self._started_ns = views.captured_ns if self._started_ns is None else self._started_ns
-        self._dark = self._look(views.images)
+        self._dark = self._look([None if item is None else item[0] for item in views.images])
+        self._key_points.look([None if item is None else item[1] for item in views.images])
         time_s = (views.captured_ns - self._started_ns) * 1e-9
         elapsed_s = _since_last(self._tracker, time_s)
-        estimate = self._tracker.update(time_s, self._observer.log_likelihoods, self._observer.presence)
+        estimate = self._tracker.update(time_s, self._log_likelihoods, self._observer.presence)
+        estimate = replace(estimate, pose=self._key_points.corrected(estimate.pose))
         self._uncertainty = estimate.detail
         first = next(iter(self._cameras.values()))
         theta, target = estimate.theta[estimate.action], estimate.target
@@ -165,6 +184,11 @@ class VideoTracker:
             ),
         )
         _learn(self._tracker, self._observer, estimate, elapsed_s)
+
+    def _log_likelihoods(self, poses: Floats) -> Floats:
+        """ln P of images and key points; what both are evidence of is counted in each."""
+        result = self._observer.log_likelihoods(poses)
+        return result + self._key_points.log_likelihoods(poses) if any(self._key_points.has_points) else result
 
     def _look(self, images: Sequence[Image | None]) -> list[str]:
         """Gives the observer the images that contain edges; messages about the others."""

@@ -20,6 +20,7 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from paramove.documents import nearest
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.arm_pose_pb2 import ArmPose
+from paramove.msgs.body_key_points_pb2 import BodyKeyPoints
 from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
@@ -110,6 +111,11 @@ CAMERA_IMAGE = Topic(
 CAMERA_IMAGES_RAW = tuple(replace(CAMERA_IMAGE_RAW, name=f"camera_{number}/image_raw") for number in range(1, 5))
 CAMERA_IMAGES = tuple(replace(CAMERA_IMAGE, name=f"camera_{number}/image") for number in range(1, 5))
 """Of the calibrated cameras that look at a person."""
+CAMERA_KEY_POINTS = tuple(
+    Topic(f"camera_{number}/key_points", BodyKeyPoints, 15, _LATEST, f"camera_{number}", recorded=True)
+    for number in range(1, 5)
+)
+"""Arms of the person in these images."""
 OBJECTS_TRACKED = Topic("objects/tracked", TrackedObjects, 15, _QUEUE, "camera_optical", recorded=True)
 GESTURES = Topic("gestures", Gesture, None, _QUEUE, recorded=True)
 GESTURES_SCENE = Topic("gestures/scene", SceneUpdate, 15, _QUEUE, "table", recorded=True)

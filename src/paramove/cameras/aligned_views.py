@@ -4,29 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
-from paramove.documents import Image
+Item = TypeVar("Item")
 
 TIMEOUT_PERIODS = 3.0
 """A camera without images for this many of its periods is gone and is not waited for."""
 
 
 @dataclass(frozen=True)
-class Views:
-    """The images of the cameras at one instant.
+class Views(Generic[Item]):
+    """The images of the cameras at one instant, or what else comes of each camera.
 
     Attributes:
         captured_ns: Capture time of the set: the latest of its images.
-        images: One [H, W, 3] for each camera in their order; None where that camera has no image of this instant.
+        images: One for each camera in their order; None where that camera has no image of this instant.
         silent: Names of the cameras that are gone.
     """
 
     captured_ns: int
-    images: tuple[Image | None, ...]
+    images: tuple[Item | None, ...]
     silent: tuple[str, ...]
 
 
-class AlignedViews:
+class AlignedViews(Generic[Item]):
     """Collects images into synchronized sets.
 
     A set is complete when each camera has an image within half a period of the latest. A camera without images
@@ -44,12 +45,12 @@ class AlignedViews:
             raise ValueError(f"time between images: more than 0 s expected, found {period_s}")
         self._names = tuple(names)
         self._period_ns = round(period_s * 1e9)
-        self._waiting: list[tuple[int, Image] | None] = [None] * len(names)
+        self._waiting: list[tuple[int, Item] | None] = [None] * len(names)
         self._received_ns: list[int | None] = [None] * len(names)
         self._started_ns: int | None = None
         self._set_ns: int | None = None
 
-    def add(self, name: str, captured_ns: int, image: Image) -> Iterator[Views]:
+    def add(self, name: str, captured_ns: int, image: Item) -> Iterator[Views[Item]]:
         """The sets, at most two, that this image completes. A delayed image, no newer than the last set, is left out.
 
         Raises ValueError for an unknown camera.
@@ -78,9 +79,9 @@ class AlignedViews:
         since_ns = self._started_ns if received_ns is None else received_ns
         return since_ns is not None and now_ns - since_ns > TIMEOUT_PERIODS * self._period_ns
 
-    def _set_at(self, instant_ns: int) -> Iterator[Views]:
+    def _set_at(self, instant_ns: int) -> Iterator[Views[Item]]:
         """The set of images within half a period of an instant; later ones wait, earlier ones are discarded."""
-        near, images = self._period_ns // 2, list[Image | None]()
+        near, images = self._period_ns // 2, list[Item | None]()
         latest_ns = instant_ns
         for index, held in enumerate(self._waiting):
             if held is None or held[0] > instant_ns + near:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 
 from paramove.cameras.calibrated import CalibratedCamera
@@ -9,6 +10,9 @@ from paramove.documents import Image
 
 NO_DATA_S = 1.0
 """A camera without images for longer than this is reported."""
+SLOW = 1.8
+"""A camera whose images come in more than so many periods is reported, by the median of `INTERVALS` intervals."""
+INTERVALS = 15
 
 
 class CameraWatch:
@@ -16,9 +20,12 @@ class CameraWatch:
 
     Args:
         cameras: As calibrated.
+        period_s: Expected time between two images of a camera, s.
     """
 
-    def __init__(self, cameras: Sequence[CalibratedCamera]) -> None:
+    def __init__(self, cameras: Sequence[CalibratedCamera], period_s: float) -> None:
+        self._period_s = period_s
+        self._times_ns = {camera.name: deque[int](maxlen=INTERVALS + 1) for camera in cameras}
         self._calibrated = {camera.name: camera for camera in cameras}
         self._rejected: dict[str, str] = {}
         self._received_ns: dict[str, int] = {}
@@ -60,7 +67,22 @@ class CameraWatch:
         rejected = [one for name, one in self._rejected.items() if name not in no_data]
         if len(no_data) == len(self._calibrated):
             return [f"no images from any camera ({', '.join(no_data)})"]
-        return [*(f"no images from {name}" for name in no_data), *rejected]
+        slow = [self._slow(name) for name in self._calibrated if name not in no_data]
+        return [*(f"no images from {name}" for name in no_data), *rejected, *(one for one in slow if one)]
+
+    def _slow(self, camera: str) -> str:
+        times = self._times_ns[camera]
+        if len(times) <= INTERVALS:
+            return ""
+        intervals_s = sorted(1e-9 * (later - earlier) for earlier, later in zip(times, list(times)[1:], strict=False))
+        median_s = intervals_s[INTERVALS // 2]
+        if median_s <= SLOW * self._period_s:
+            return ""
+        return (
+            f"{camera} gives {1.0 / median_s:.0f} images per second, {1.0 / self._period_s:.0f} are expected: "
+            "more light, a lower resolution or a port of its own helps"
+        )
 
     def _received(self, camera: str, captured_ns: int) -> None:
+        self._times_ns[camera].append(captured_ns)
         self._received_ns[camera] = max(captured_ns, self._received_ns.get(camera, captured_ns))

@@ -27,6 +27,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "node": ("paramove.cli.node", "Look at the nodes on the bus."),
     "logs": ("paramove.cli.logs", "Show the log lines of a run's nodes, in the order of time."),
     "calibrate": ("paramove.cli.calibrate", "Print the calibration board; calibrate cameras."),
+    "webcam": ("paramove.cli.webcam", "Fetch what tracking a person with a webcam needs."),
     "arm": ("paramove.cli.arm", "Find, set up, calibrate, check, move and stop an arm of servos."),
     "demos": ("paramove.cli.demos", "List, show, plot, label, import, split and synthesize demonstrations."),
     "train": ("paramove.cli.train", "Train movement models from demonstrations."),

@@ -44,9 +44,9 @@ class BodyTracking:
     def __init__(self, cameras: Sequence[CalibratedCamera], options: BodyTrackerOptions, period_s: float) -> None:
         self._tracker = StereoBodyTracker(cameras, options)
         self._calibrated = {camera.name: camera for camera in cameras}
-        self._views = AlignedViews(list(self._calibrated), period_s)
+        self._views = AlignedViews[Image](list(self._calibrated), period_s)
         self._names = tuple(options.markers)
-        self._watch = CameraWatch(cameras)
+        self._watch = CameraWatch(cameras, period_s)
         self._detected_ns: dict[str, int] = {}
         self._latest_ns = 0
 
@@ -81,7 +81,7 @@ class BodyTracking:
         """Cameras without usable images and points that are not detected; "" if nothing is wrong."""
         return "; ".join([*self._watch.troubles(), *self._undetected()])
 
-    def _located(self, views: Views) -> BodyPoints:
+    def _located(self, views: Views[Image]) -> BodyPoints:
         points = self._tracker.located(views.images)
         self._latest_ns = views.captured_ns
         for name in self._names:

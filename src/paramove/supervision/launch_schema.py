@@ -78,7 +78,8 @@ class NodeSettings(_Checked):
     ends_run: bool = Field(default=False, description="the run succeeds when this node finishes with exit code 0")
     lockstep: bool = Field(default=True, description="if the bus runs in lockstep: whether time waits for this node")
     optional_topics: list[str] = Field(
-        default_factory=list, description="subscribed topics that may lack a publisher; '*': all"
+        default_factory=list,
+        description="subscribed topics that may lack a publisher, or patterns of them such as '*/key_points'; '*': all",
     )
     truth: bool = Field(
         default=False, description="gets the folder of ground truth; for the simulator and the judge only"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from fnmatch import fnmatchcase
 
 from paramove.bus import CLOCK, Topic, topics
 from paramove.documents import DocumentError, nearest, raise_any
@@ -101,8 +102,7 @@ def _subscribers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterato
             if topic.truth and not launch.file.nodes[name].truth:
                 yield launch.error(("nodes", name), f"'{name}' uses {topic.name} but has no 'truth: true'")
     for name, topic in unpublished(launch, interfaces):
-        optional = launch.file.nodes[name].optional_topics
-        if topic.name not in optional and "*" not in optional:
+        if not any(fnmatchcase(topic.name, one) for one in launch.file.nodes[name].optional_topics):
             yield launch.error(
                 ("nodes", name),
                 f"'{name}' subscribes to {on_bus(launch, name, topic)}, which no node of this launch file publishes; "
@@ -116,7 +116,7 @@ def _named_topics(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterat
         node = launch.file.nodes[name]
         subscribes = {topic.name for topic in interface.subscribes}
         for index, optional in enumerate(node.optional_topics):
-            if optional != "*" and optional not in subscribes:
+            if optional != "*" and not any(fnmatchcase(topic, optional) for topic in subscribes):
                 path = ("nodes", name, "optional_topics", str(index))
                 yield launch.error(
                     path, f"'{name}' does not subscribe to {optional!r}; {nearest(optional, subscribes)}"

@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 
 from paramove.cameras.calibrated import CalibratedCamera
+from paramove.observation import BodyKeyPoints
 from paramove.observation.arm_observer import ArmObserver
 from studies.real_images import pointing_model, seated_person
-from studies.real_images.scores import middle_of_hand
+from studies.real_images.scores import FLESH_M, middle_of_hand
 
 LENS = [600.0, 0.0, 0.0, 0.0, 600.0, 0.0, 320.0, 240.0, 1.0]
 
@@ -46,5 +47,27 @@ def write_recording(folder: Path) -> np.ndarray:
         cv2.fillPoly(image, [observer.outline(pose, 0).round().astype(np.int32)], (190, 200, 210))
         image = cv2.add(image, noise.integers(0, 6, image.shape, dtype=np.uint8))
         cv2.imwrite(str(folder / "color" / f"{number:05d}.jpg"), image)
-    np.savez(folder / "hand_reference.npz", uv=camera.project(middle_of_hand(poses)))
+    middle = middle_of_hand(poses)
+    np.savez(folder / "hand_reference.npz", uv=camera.project(middle), xyz_m=seated_person.in_camera(middle, camera))
+    (folder / "depth").mkdir()
+    for number, points in enumerate(key_points(camera, poses)):
+        depth = np.zeros((480, 640), np.uint16)
+        x, y = points.positions[0, 0].astype(int)
+        shoulder = seated_person.in_camera(poses[number : number + 1, :3], camera)[0]
+        depth[y - 9 : y + 10, x - 9 : x + 10] = round(1000.0 * (shoulder[2] - FLESH_M))
+        cv2.imwrite(str(folder / "depth" / f"{number:05d}.png"), depth)
     return poses
+
+
+def key_points(camera: CalibratedCamera, poses: np.ndarray) -> list[BodyKeyPoints]:
+    """As a network would detect them without any error; the left arm hangs beside the right one."""
+    found = []
+    for pose in poses:
+        shoulder, elbow, hand = pose.reshape(3, 3)
+        wrist = elbow + seated_person.SIZES.forearm / seated_person.SIZES.lower_arm * (hand - elbow)
+        arm = np.stack([shoulder, elbow, wrist, middle_of_hand(pose)[0]])
+        right, ahead = camera.project(arm), seated_person.in_camera(arm, camera)[:, 2]
+        left = right[0] + [[90.0, 0.0], [95.0, 70.0], [90.0, 130.0], [88.0, 150.0]]
+        depths = np.stack([ahead - ahead[0], np.zeros(4)])
+        found.append(BodyKeyPoints(np.stack([right, left]), np.full((2, 4), 4.0), depths, np.ones((2, 4)), 1.0))
+    return found

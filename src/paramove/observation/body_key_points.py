@@ -1,0 +1,78 @@
+"""Key points of both arms in one image: what a pose network publishes and what an observer compares postures with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramove.documents import Floats
+from paramove.msgs.body_key_points_pb2 import BodyKeyPoints as BodyKeyPointsMessage
+
+SIDES = ("right", "left")
+ARM_POINTS = ("shoulder", "elbow", "wrist", "hand")
+"""The hand's is its middle, whether the index finger is stretched or not."""
+NAMES = {f"{side}_{point}": (i, j) for i, side in enumerate(SIDES) for j, point in enumerate(ARM_POINTS)}
+
+
+@dataclass(frozen=True)
+class BodyKeyPoints:
+    """The arms of one person in one image as captured; the first axis is `SIDES`, the second `ARM_POINTS`.
+
+    Attributes:
+        positions: (2, 4, 2), px; NaN where a point is unknown.
+        deviations: Along each axis, (2, 4), px.
+        depths: How much farther from the camera than the shoulder of that arm, (2, 4), m.
+        certainties: That a point is visible, (2, 4), 0 to 1.
+        certainty: That there is a person, 0 to 1.
+    """
+
+    positions: Floats
+    deviations: Floats
+    depths: Floats
+    certainties: Floats
+    certainty: float
+
+    @classmethod
+    def nobody(cls, certainty: float = 0.0) -> BodyKeyPoints:
+        """No person in view."""
+        shape = (len(SIDES), len(ARM_POINTS))
+        unknown = np.full(shape, np.nan)
+        return cls(np.full((*shape, 2), np.nan), unknown, unknown, np.zeros(shape), certainty)
+
+    @property
+    def has_person(self) -> bool:
+        """Whether any point is known."""
+        return bool(np.isfinite(self.positions).any())
+
+    def exchanged(self) -> BodyKeyPoints:
+        """Right and left exchanged."""
+        return BodyKeyPoints(
+            self.positions[::-1], self.deviations[::-1], self.depths[::-1], self.certainties[::-1], self.certainty
+        )
+
+
+def key_points_message(points: BodyKeyPoints, captured_ns: int) -> BodyKeyPointsMessage:
+    """The known points."""
+    message = BodyKeyPointsMessage(certainty=points.certainty)
+    message.captured.FromNanoseconds(captured_ns)
+    for name, at in NAMES.items():
+        x, y = points.positions[at]
+        if np.isfinite((x, y)).all():
+            values = (points.deviations[at], points.depths[at], points.certainties[at])
+            message.points.add(
+                name=name, x=x, y=y, **dict(zip(("deviation", "depth", "certainty"), values, strict=True))
+            )
+    return message
+
+
+def key_points_from(message: BodyKeyPointsMessage) -> BodyKeyPoints:
+    """Of a message; points that are unusable or that nobody here knows are left out."""
+    points = BodyKeyPoints.nobody(message.certainty)
+    deviations, depths = points.deviations.copy(), points.depths.copy()
+    for one in message.points:
+        at = NAMES.get(one.name)
+        if at is not None and np.isfinite((one.x, one.y, one.deviation, one.depth)).all() and one.deviation > 0.0:
+            points.positions[at], points.certainties[at] = (one.x, one.y), one.certainty
+            deviations[at], depths[at] = one.deviation, one.depth
+    return BodyKeyPoints(points.positions, deviations, depths, points.certainties, points.certainty)
