@@ -218,8 +218,9 @@ def imitation(out: Path) -> dict[str, Any]:
 def real_images(out: Path) -> dict[str, Any]:
     """Means over the seeds of each replay."""
     found = load(out / "numbers.json")
-    rows = []
-    for name, runs in found["cases"].items():
+    rows, order = [], ["outline and key points", "outline alone", "network alone", "sides exchanged in a quarter"]
+    for name in sorted(found["cases"], key=lambda name: (name not in order, order.index(name) if name in order else 0)):
+        runs = found["cases"][name]
         row: dict[str, Any] = {"name": name}
         for frames, short in (("6-9", "short"), ("32-50", "long"), ("43-49", "swing"), ("all", "all")):
             frames = "all frames" if frames == "all" else f"frames {frames}"
