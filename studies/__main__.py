@@ -10,6 +10,7 @@ from studies.chapter6.command import chapter6
 from studies.faults.command import faults, kills
 from studies.imitation.command import imitation
 from studies.movements.command import peers, real
+from studies.multicam.command import multicam
 from studies.real_images.command import real_images
 
 app = typer.Typer(name="studies", help="Repeat the experiments of the thesis, and ours.", no_args_is_help=True)
@@ -22,6 +23,7 @@ app.command("chapter2")(chapter2)
 app.command("chapter4")(chapter4)
 app.command("chapter6")(chapter6)
 app.command("real-images")(real_images)
+app.command()(multicam)
 
 if __name__ == "__main__":
     app(prog_name="python -m studies")

@@ -11,7 +11,8 @@ from dynamixel_emulator.emulator import DynamixelEmulator
 from dynamixel_emulator.servo import EmulatedServo
 from paramove.cli.main import build
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
-from paramove.demonstrations.kinesthetic_teaching import PARAMETERS, KinestheticTeacher, moved_part
+from paramove.demonstrations.kinesthetic_teaching import KinestheticTeacher
+from paramove.demonstrations.taught_set import PARAMETERS, moved_part
 from paramove.motion.reaching_file import load_reaching_model
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.motion.timing import minimum_jerk
@@ -135,12 +136,12 @@ def test_the_newest_segments_are_dropped_one_by_one(hands, tmp_path):
     teacher = KinestheticTeacher(ROBOT, folder, "reaching")
     for target in TARGETS[:2]:
         hands.teach(teacher, target)
-    assert teacher.drop() == "taught_002.mcap"
+    assert teacher.taught.drop() == "taught_002.mcap"
     assert len(DemonstrationSet.load(folder)) == 1
-    assert teacher.drop() == "taught_001.mcap"
+    assert teacher.taught.drop() == "taught_001.mcap"
     assert list(folder.iterdir()) == []
     with pytest.raises(DemonstrationError, match="no segment of this session is left"):
-        teacher.drop()
+        teacher.taught.drop()
 
 
 def test_a_set_that_was_changed_meanwhile_is_left_alone(hands, tmp_path):
@@ -149,7 +150,7 @@ def test_a_set_that_was_changed_meanwhile_is_left_alone(hands, tmp_path):
     other = KinestheticTeacher(ROBOT, tmp_path, "reaching", append=True)
     hands.teach(other, TARGETS[1])
     with pytest.raises(DemonstrationError, match=r"labels.yaml was changed meanwhile; take taught_001.mcap out"):
-        teacher.drop()
+        teacher.taught.drop()
     assert len(DemonstrationSet.load(tmp_path)) == 2
 
 
@@ -190,7 +191,7 @@ def test_rests_are_no_part_of_a_movement():
     hand = np.zeros((20, 3))
     hand[5:15, 0] = np.linspace(0.0, 0.1, 10)
     hand[15:, 0] = 0.1
-    assert moved_part(hand) == (5, 15)
+    assert moved_part(hand, 0.002) == (5, 15)
 
 
 def test_the_commands_take_such_a_set(taught, tmp_path):

@@ -75,6 +75,8 @@ from .synthetic import table_place as table_place
 from .synthetic import table_targets as table_targets
 from .synthetic import usual_elbow as usual_elbow
 from .synthetic_set import synthetic_takes as synthetic_takes
+from .taught_set import TaughtSet as TaughtSet
+from .taught_set import moved_part as moved_part
 from .timing import resampled as resampled
 from .writing import Label as Label
 from .writing import Take as Take

@@ -3,6 +3,8 @@ from .arm_body import HAND as HAND
 from .arm_body import POSE_POINTS as POSE_POINTS
 from .arm_body import ArmSizes as ArmSizes
 from .arm_body import fitted_poses as fitted_poses
+from .arm_movement import ArmMovement as ArmMovement
+from .arm_movement import reconstructed as reconstructed
 from .arm_observer import ArmObserver as ArmObserver
 from .arm_observer import ContourMatch as ContourMatch
 from .body_key_points import ARM_POINTS as ARM_POINTS
@@ -26,3 +28,5 @@ from .options import ObservationOptions as ObservationOptions
 from .pose_detection import PoseDetection as PoseDetection
 from .pose_network import PoseNetwork as PoseNetwork
 from .presence import Presence as Presence
+from .webcam_teaching import WebcamTeacher as WebcamTeacher
+from .webcam_teaching import board_targets as board_targets

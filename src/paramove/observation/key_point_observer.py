@@ -111,7 +111,7 @@ class KeyPointObserver:
         if usable.any():
             arm = self._arm_points(fitted[usable])
             for camera, points in self._seen():
-                result[usable] += np.logaddexp.reduce(self._hypotheses(arm, camera, points, self.options.model), axis=0)
+                result[usable] += np.logaddexp.reduce(self.hypotheses(arm, camera, points, self.options.model), axis=0)
         return result
 
     def corrected(self, pose: ArrayLike) -> Floats:
@@ -127,13 +127,13 @@ class KeyPointObserver:
         arm = self._arm_points(before[None])
         precision, towards = self._prior(before, [camera for camera, _ in seen]), np.zeros(len(before))
         for camera, points in seen:
-            hypotheses = self._hypotheses(arm, camera, points, self.options.across)[:, 0]
+            hypotheses = self.hypotheses(arm, camera, points, self.options.across)[:, 0]
             hypothesis = int(hypotheses.argmax())
             if hypothesis >= len(SIDES):
                 continue
             slopes, projected = self._slopes(before, camera)
             bent_px = self._model_px(arm, camera, 0.0)[0]
-            own, total = self._densities(arm, camera, points, hypothesis, self.options.across)
+            own, total = self.densities(arm, camera, points, hypothesis, self.options.across)
             inlier = np.exp(own - total)[0]
             for point in np.flatnonzero(np.isfinite(points.positions[hypothesis, :, 0])):
                 weight = inlier[point] / (points.deviations[hypothesis, point] ** 2 + bent_px[point] ** 2)
@@ -152,13 +152,13 @@ class KeyPointObserver:
         wrist = points[:, 3] if points.shape[1] == 4 else (1.0 - fraction) * elbow + fraction * tip
         return np.stack([shoulder, elbow, wrist, 0.5 * (wrist + tip)], axis=1)
 
-    def _hypotheses(self, arm: Floats, camera: CalibratedCamera, points: BodyKeyPoints, model: float) -> Floats:
+    def hypotheses(self, arm: Floats, camera: CalibratedCamera, points: BodyKeyPoints, model: float) -> Floats:
         """ln p of the points of the right arm being its own, those of the left one, or none of the arm; (3, M)."""
-        sides = [self._densities(arm, camera, points, side, model)[1].sum(axis=1) for side in range(len(SIDES))]
+        sides = [self.densities(arm, camera, points, side, model)[1].sum(axis=1) for side in range(len(SIDES))]
         nothing = ELSEWHERE * np.isfinite(points.positions[0, :, 0]).sum()
         return np.stack([*sides, np.full(len(arm), nothing)]) + self.options.weights[:, None]
 
-    def _densities(
+    def densities(
         self, arm: Floats, camera: CalibratedCamera, points: BodyKeyPoints, side: int, model: float
     ) -> tuple[Floats, Floats]:
         """ln of the density of each point of one side, as a point of the arm and as any; (M, 4), of squared deviations.

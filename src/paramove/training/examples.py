@@ -17,6 +17,8 @@ VARIES = 0.1
 ARM_FLOOR_M = 5e-4
 """Accuracy of a servo arm's points: one step of an encoder with 4096 steps a turn moves a hand 0.3 m from the joint by
 this much. The arm's base does not move at all; without a floor, points that never move could not be learned."""
+DEPENDENT = 1e-9
+"""Smallest variance of a direction, of the largest: below, a point follows from others, and needs the floor as well."""
 PERSONS_FOR_GROUPS = 3
 """With at least this many persons, the cross-validation of training leaves out whole persons."""
 
@@ -60,7 +62,13 @@ class Examples:
     @property
     def floor_deviation(self) -> float:
         """Best accuracy of the points, m; 0: estimated from their variation."""
-        return ARM_FLOOR_M if self.frame == ARM_BASE else 0.0
+        return ARM_FLOOR_M if self.frame == ARM_BASE or self._are_dependent else 0.0
+
+    @property
+    def _are_dependent(self) -> bool:
+        """Whether a coordinate follows exactly from the others, as that of a point made from two others does."""
+        variances = np.linalg.eigvalsh(np.cov(np.concatenate(self.sequences), rowvar=False))
+        return bool(variances[0] < DEPENDENT * variances[-1])
 
     @property
     def groups(self) -> list[str] | None:

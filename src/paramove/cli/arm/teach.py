@@ -81,7 +81,7 @@ def teach(
                     typer.echo(printable(f"not switched off: {failed}"), err=True)
                 _tell_end(teacher, folder)
     except QuitError:
-        raise typer.Exit(exit_codes.OK if teacher.written else exit_codes.FAILURE) from None
+        raise typer.Exit(exit_codes.OK if teacher.taught.written else exit_codes.FAILURE) from None
     except KeyboardInterrupt:
         raise ended("interrupted", exit_codes.by_signal(signal.SIGINT)) from None
 
@@ -125,9 +125,10 @@ def _press(key: str, teacher: KinestheticTeacher) -> None:
             typer.echo("recording: lead the arm, and press space where it arrives")
         elif key == " ":
             x, y, z = 100.0 * teacher.end()
-            typer.echo(f"{len(teacher.written)}: {teacher.written[-1]} ends at ({x:.1f}, {y:.1f}, {z:.1f}) cm")
+            written = teacher.taught.written
+            typer.echo(f"{len(written)}: {written[-1]} ends at ({x:.1f}, {y:.1f}, {z:.1f}) cm")
         elif key == "d":
-            typer.echo(f"dropped {teacher.drop()}")
+            typer.echo(f"dropped {teacher.taught.drop()}")
     except DemonstrationError as error:
         typer.echo(printable(str(error)))
 
@@ -135,7 +136,7 @@ def _press(key: str, teacher: KinestheticTeacher) -> None:
 def _tell_end(teacher: KinestheticTeacher, folder: Path) -> None:
     if teacher.is_recording:
         typer.echo("the segment that had not ended is left out")
-    if not teacher.written:
+    if not teacher.taught.written:
         typer.echo(f"no segment was recorded: {folder} is as it was")
         return
-    typer.echo(f"{folder}: {len(teacher.written)} new; look at them with `paramove demos list {folder}`")
+    typer.echo(f"{folder}: {len(teacher.taught.written)} new; look at them with `paramove demos list {folder}`")

@@ -1,0 +1,1 @@
+"""Arms reconstructed from several real cameras."""
