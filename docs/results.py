@@ -235,6 +235,27 @@ def real_images(out: Path) -> dict[str, Any]:
     return {"rows": rows, "goals": goals}
 
 
+def multicam(out: Path) -> dict[str, Any]:
+    """By camera and by bone."""
+    found = load(out / "numbers.json")
+    cameras = [
+        {"name": name, "offset": offset, "left_out": found["left_out_px"][name],
+         "strange": found["exchanged_or_of_nothing"][name]}
+        for name, offset in found["offsets_px"].items()
+    ]  # fmt: skip
+    bones = [
+        {"name": name, "length": length, "deviation": found["deviation_of_lengths_cm"][name]}
+        for name, length in found["lengths_cm"].items()
+    ]
+    keys = ("reprojection_px", "reprojection_without_offsets_px", "exchanges")
+    return {"cameras": cameras, "bones": bones, **{key: found[key] for key in keys}}
+
+
+def teaching(out: Path) -> dict[str, Any]:
+    """Means over the simulated persons."""
+    return {"rows": load(out / "numbers.json")["rows"]}
+
+
 COMPARED_METHODS = {
     "quadratic": "paramove, quadratic PHMM",
     "linear": "paramove, linear PHMM",
@@ -507,6 +528,8 @@ MEASUREMENTS = {
     "real_images": Measurement(
         ("python -m studies real-images --out {out} --json {out}/numbers.json",), real_images, "a minute"
     ),
+    "multicam": Measurement(("python -m studies multicam --json {out}/numbers.json",), multicam, "2 minutes"),
+    "teaching": Measurement(("python -m studies teaching --json {out}/numbers.json",), teaching, "a minute"),
     "movements": Measurement(
         (
             "python -m studies peers --on real --jobs 2 --task pointing/corners --task pointing/direction"

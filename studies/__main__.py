@@ -12,6 +12,7 @@ from studies.imitation.command import imitation
 from studies.movements.command import peers, real
 from studies.multicam.command import multicam
 from studies.real_images.command import real_images
+from studies.teaching.command import teaching
 
 app = typer.Typer(name="studies", help="Repeat the experiments of the thesis, and ours.", no_args_is_help=True)
 app.command("kills")(kills)
@@ -24,6 +25,7 @@ app.command("chapter4")(chapter4)
 app.command("chapter6")(chapter6)
 app.command("real-images")(real_images)
 app.command()(multicam)
+app.command()(teaching)
 
 if __name__ == "__main__":
     app(prog_name="python -m studies")

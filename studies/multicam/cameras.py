@@ -29,14 +29,15 @@ def read_calibration(folder: Path) -> list[CalibratedCamera]:
         return [_camera(one) for one in ElementTree.parse(path).getroot().iter("camera")]
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}", missing=True) from error
-    except (ElementTree.ParseError, ValueError, AttributeError, TypeError) as error:
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise InputError(f"{path}: {error}; a calibration by Qualisys expected") from error
 
 
 def _camera(element: ElementTree.Element) -> CalibratedCamera:
     def numbers(part: str, *names: str) -> list[float]:
         found = element.find(part)
-        assert found is not None
+        if found is None:
+            raise LookupError(f"a camera without {part!r}")
         return [float(str(found.get(name))) for name in names]
 
     turn = np.array(numbers("transform", *(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))))
@@ -58,7 +59,7 @@ def _camera(element: ElementTree.Element) -> CalibratedCamera:
 def moved_centre(camera: CalibratedCamera, offset_px: ArrayLike) -> CalibratedCamera:
     """The camera with its principal point moved, (2,), px."""
     matrix = camera.matrix.copy()
-    matrix[:2, 2] += offset_px
+    matrix[:2, 2] += np.asarray(offset_px, dtype=np.float64)
     return replace(camera, matrix=matrix)
 
 

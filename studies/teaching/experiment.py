@@ -19,8 +19,8 @@ from paramove.training import examples_of, train_and_write, untrained
 from studies.teaching.simulated_person import RATE_HZ, SIZES, key_points, mean_path, performance
 
 SQUARE_M = 0.03
-PLACES = ((1.7, -0.9, 0.75), (0.6, -1.8, 0.8))
-"""Of the cameras, m, in the frame of the table: in front to the right, and at the right."""
+PLACES = ((0.6, -1.8, 0.8), (1.7, -0.9, 0.75))
+"""Of the cameras, m, in the frame of the table: at the right of the person, as one camera stands; in front."""
 MEASURED_M, LENGTH_ERROR = 0.02, 0.03
 """Deviations of the person's measures: position of the shoulder, and lengths as a fraction."""
 NEW_POSITIONS = 12
@@ -31,10 +31,10 @@ GOALS_CM = {2: {"end": 1.0, "path": 4.0}, 1: {"end": 2.0, "path": 7.0}}
 
 def cameras(count: int) -> list[CalibratedCamera]:
     """640 x 480 px, looking at the arm."""
-    return [_camera(f"camera_{number}", np.array(place)) for number, place in enumerate(PLACES[:count], start=1)]
+    return [camera_at(f"camera_{number}", np.array(place)) for number, place in enumerate(PLACES[:count], start=1)]
 
 
-def _camera(name: str, place: Floats) -> CalibratedCamera:
+def camera_at(name: str, place: Floats) -> CalibratedCamera:
     forward = np.array([0.0, -0.15, 0.2]) - place
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])

@@ -50,7 +50,9 @@ def _arrival(pose: Floats, target: Floats) -> int:
 def _with_rests(pose: Floats, target: Floats) -> Floats:
     arrived = _arrival(pose, target)
     out = pose[: arrived + 1]
-    rest, hold = (np.repeat(row[None], round(s * SAMPLE_RATE_HZ), axis=0) for row, s in ((out[0], REST_S), (out[-1], HOLD_S)))
+    rest, hold = (
+        np.repeat(row[None], round(s * SAMPLE_RATE_HZ), axis=0) for row, s in ((out[0], REST_S), (out[-1], HOLD_S))
+    )
     whole = np.concatenate([rest, out, hold, out[::-1], rest])
     at = np.arange(0.0, len(whole) - 1.0, SAMPLE_RATE_HZ / RATE_HZ)
     return np.stack([np.interp(at, np.arange(len(whole)), column) for column in whole.T], axis=1)
@@ -74,9 +76,13 @@ def key_points(
     outliers = rng.random(arms.shape[:3]) < options.outlier
     noise[outliers] += rng.normal(0.0, 30.0 * scale, (int(outliers.sum()), 2))
     pixels = camera.project(arms) + noise
-    behind = ahead - ahead[..., :1] + rng.normal(0.0, np.where(np.isfinite(options.depths), options.depths, 0.0), (2, 4))
+    behind = (
+        ahead - ahead[..., :1] + rng.normal(0.0, np.where(np.isfinite(options.depths), options.depths, 0.0), (2, 4))
+    )
     swapped = rng.random(len(poses)) < options.exchanged
-    found = [BodyKeyPoints(px, deviations, depth, np.ones((2, 4)), 1.0) for px, depth in zip(pixels, behind, strict=True)]
+    found = [
+        BodyKeyPoints(px, deviations, depth, np.ones((2, 4)), 1.0) for px, depth in zip(pixels, behind, strict=True)
+    ]
     return [one.exchanged() if swap else one for one, swap in zip(found, swapped, strict=True)]
 
 

@@ -22,6 +22,7 @@ from nodes import (
     camera,
     colour_tracker,
     operator,
+    pose_detector,
     reacher,
     recognizer,
     recorder,
@@ -40,6 +41,7 @@ from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
 from paramove.objects.homography import PlaneHomography
+from paramove.observation import BodyKeyPoints, key_points_message
 from paramove.robots.hoap3.wire import state_message
 from tests.action_space import drawn_arm
 from tests.applications.pointing_story import PointingStory
@@ -155,6 +157,17 @@ def _estimate(number: int) -> ActionEstimate:
 def of_action_tracker() -> list[Event]:
     images = drawn_arm.drawn(drawn_arm.pointing()[1][:30], drawn_arm.camera(1))
     frames = [encode(Frame(image, 0, number)) for number, image in enumerate(images)]
+    arms = BodyKeyPoints(np.full((2, 4, 2), 80.0), np.full((2, 4), 3.0), np.zeros((2, 4)), np.ones((2, 4)), 1.0)
+    seen = [
+        (topics.CAMERA_KEY_POINTS[number % 4], key_points_message(arms, round(number * 1e9 / 15)))
+        for number in range(len(frames))
+    ]
+    pictures = [(topics.CAMERA_IMAGES[number % 4], frame) for number, frame in enumerate(frames)]
+    return timed(one for pair in zip(seen, pictures, strict=True) for one in pair)
+
+
+def of_pose_detector() -> list[Event]:
+    frames = [encode(Frame(np.full((120, 160, 3), 90, np.uint8), 0, number)) for number in range(8)]
     return timed((topics.CAMERA_IMAGES[number % 4], frame) for number, frame in enumerate(frames))
 
 
@@ -242,6 +255,7 @@ NODES: dict[str, tuple[Any, Callable[[], list[Event]], dict[str, Any]]] = {
     "recognizer of poses": (recognizer, of_pointing_poses, {"pointing_from": "poses"}),
     "body_tracker": (body_tracker, of_body_tracker, {}),
     "action_tracker": (action_tracker, of_action_tracker, {}),
+    "pose_detector": (pose_detector, of_pose_detector, {}),
     "rule_learner": (rule_learner, of_rule_learner, {}),
     "relocator": (relocator, of_relocator, {}),
     "synthesizer": (synthesizer, of_synthesizer, {"robot": ROBOT_FOLDER}),

@@ -112,7 +112,7 @@ CAMERA_IMAGES_RAW = tuple(replace(CAMERA_IMAGE_RAW, name=f"camera_{number}/image
 CAMERA_IMAGES = tuple(replace(CAMERA_IMAGE, name=f"camera_{number}/image") for number in range(1, 5))
 """Of the calibrated cameras that look at a person."""
 CAMERA_KEY_POINTS = tuple(
-    Topic(f"camera_{number}/key_points", BodyKeyPoints, 15, _LATEST, f"camera_{number}", recorded=True)
+    Topic(f"camera_{number}/key_points", BodyKeyPoints, 15, _QUEUE, f"camera_{number}", recorded=True)
     for number in range(1, 5)
 )
 """Arms of the person in these images."""

@@ -28,6 +28,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "logs": ("paramove.cli.logs", "Show the log lines of a run's nodes, in the order of time."),
     "calibrate": ("paramove.cli.calibrate", "Print the calibration board; calibrate cameras."),
     "webcam": ("paramove.cli.webcam", "Fetch what tracking a person with a webcam needs."),
+    "teach": ("paramove.cli.teach", "Teach a movement by showing it to cameras."),
     "arm": ("paramove.cli.arm", "Find, set up, calibrate, check, move and stop an arm of servos."),
     "demos": ("paramove.cli.demos", "List, show, plot, label, import, split and synthesize demonstrations."),
     "train": ("paramove.cli.train", "Train movement models from demonstrations."),

@@ -17,6 +17,8 @@ from .body_messages import scene_message as scene_message
 from .body_tracking import BodyTrackingSetup as BodyTrackingSetup
 from .key_point_observer import KeyPointObserver as KeyPointObserver
 from .key_point_observer import KeyPointOptions as KeyPointOptions
+from .key_point_stream import detected_key_points as detected_key_points
+from .key_point_stream import recorded_key_points as recorded_key_points
 from .markers import DEFAULT_MARKERS as DEFAULT_MARKERS
 from .markers import ArucoMarker as ArucoMarker
 from .markers import BodyTrackerOptions as BodyTrackerOptions

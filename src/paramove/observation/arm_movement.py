@@ -25,10 +25,12 @@ POINTS, DIMENSIONS = len(ARM_POINTS), 3 * len(ARM_POINTS)
 SHOULDER, ELBOW, WRIST, HAND = range(POINTS)
 SPEED_CHANGES = np.array([1.0, 3.0, 4.0, 4.0])
 """Deviation of the acceleration of the points, m/s², of movements that teach."""
-LENGTH_M, TOUCH_M, REST_M = 0.01, 0.003, 0.05
-"""Deviation of a bone's length, of a fingertip from what it touches, of the shoulder from where it rests."""
+LENGTH_M, TOUCH_M, REST_M, HANGS_M = 0.01, 0.003, 0.03, 0.1
+"""Deviation of a bone's length, of a fingertip from what it touches, of the shoulder from where it rests, of a hanging
+hand from below it."""
 STEPS = 12
 JUMP_M, JUMP_FRAMES = 0.25, 9
+"""A first guess that is so far from its median over so many images comes from exchanged sides."""
 COARSE_M, FINE_M = 0.2, 0.02
 """By how much the path may be off in the first step, and in the last ones, where sides and outliers are judged."""
 
@@ -55,12 +57,13 @@ class ArmMovement:
     @property
     def lengths(self) -> Floats:
         """Upper arm, forearm, wrist to the middle of the hand, (T, 3), m."""
-        return np.linalg.norm(np.diff(self.points, axis=1), axis=2)
+        return np.asarray(np.linalg.norm(np.diff(self.points, axis=1), axis=2))
 
 
 def reconstructed(
     cameras: Sequence[CalibratedCamera], times_s: ArrayLike, key_points: Sequence[Sequence[BodyKeyPoints | None]], *,
     sizes: ArmSizes | None = None, shoulder: ArrayLike | None = None, touched: tuple[ArrayLike, float] | None = None,
+    hangs_until_s: float = -np.inf,
 ) -> ArmMovement:  # fmt: skip
     """The movement of a right arm.
 
@@ -70,6 +73,7 @@ def reconstructed(
         sizes: Of the arm; without, the bones' lengths are free, which needs two cameras.
         shoulder: Where it rests, (3,), m; needed with one camera.
         touched: Where the fingertip is at the end, (3,), m, and from which time on, s.
+        hangs_until_s: Until then the arm hangs down from the shoulder; used if sizes are given.
 
     Raises InputError for too few images, or for one camera without sizes or shoulder.
     """
@@ -92,6 +96,9 @@ def reconstructed(
         if sizes is not None:
             for bone, length in enumerate((sizes.upper_arm, sizes.forearm, 0.5 * sizes.hand)):
                 system.add_length(points, bone, length)
+            hanging = slice(0, int(np.searchsorted(times, hangs_until_s)))
+            down = np.array([0.0, 0.0, -(sizes.upper_arm + sizes.forearm + 0.5 * sizes.hand)])
+            system.add_position(points, hanging, {HAND: 1.0, SHOULDER: -1.0}, down, HANGS_M)
         if rest is not None:
             system.add_position(points, slice(None), {SHOULDER: 1.0}, rest, REST_M)
         if touched is not None:

@@ -12,6 +12,8 @@ from paramove.msgs.body_key_points_pb2 import BodyKeyPoints as BodyKeyPointsMess
 SIDES = ("right", "left")
 ARM_POINTS = ("shoulder", "elbow", "wrist", "hand")
 """The hand's is its middle, whether the index finger is stretched or not."""
+LARGEST = (1e5, 1e5, 1e4, 10.0)
+"""x, y, deviation, px, and depth, m, that a point may have."""
 NAMES = {f"{side}_{point}": (i, j) for i, side in enumerate(SIDES) for j, point in enumerate(ARM_POINTS)}
 
 
@@ -72,7 +74,8 @@ def key_points_from(message: BodyKeyPointsMessage) -> BodyKeyPoints:
     deviations, depths = points.deviations.copy(), points.depths.copy()
     for one in message.points:
         at = NAMES.get(one.name)
-        if at is not None and np.isfinite((one.x, one.y, one.deviation, one.depth)).all() and one.deviation > 0.0:
+        values = np.abs((one.x, one.y, one.deviation, one.depth))
+        if at is not None and (values <= LARGEST).all() and one.deviation > 0.0:  # NaN is not
             points.positions[at], points.certainties[at] = (one.x, one.y), one.certainty
             deviations[at], depths[at] = one.deviation, one.depth
     return BodyKeyPoints(points.positions, deviations, depths, points.certainties, points.certainty)

@@ -100,10 +100,6 @@ class PoseNetwork:
     Args:
         pose, hand: Files of the networks.
 
-    Attributes:
-        others: Whether another person was in view lately.
-        turn: Angle of a person's downward axis to the picture's, rad; a multiple of 90 degrees.
-
     Raises InputError for a file that is no network.
     """
 
@@ -117,10 +113,12 @@ class PoseNetwork:
 
     @property
     def others(self) -> bool:
+        """Whether another person was in view lately."""
         return self._other_window is not None
 
     @property
     def turn(self) -> float:
+        """Angle of a person's downward axis to the picture's, rad; a multiple of 90 degrees."""
         return float(TURNS[self._votes.argmax()])
 
     def detect(self, image: Image) -> BodyKeyPoints:

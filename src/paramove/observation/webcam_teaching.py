@@ -6,7 +6,7 @@ position that is touched is known, so it anchors the movement in space and is it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +60,7 @@ class WebcamTeacher:
     """
 
     def __init__(
-        self, cameras: Sequence[CalibratedCamera], targets: dict[str, ArrayLike], taught: TaughtSet, *,
+        self, cameras: Sequence[CalibratedCamera], targets: Mapping[str, Floats], taught: TaughtSet, *,
         sizes: ArmSizes | None = None, shoulder: ArrayLike | None = None, rate_hz: float = 15.0,
     ) -> None:  # fmt: skip
         if len(cameras) == 1 and (sizes is None or shoulder is None):
@@ -68,7 +68,7 @@ class WebcamTeacher:
         if not targets:
             raise InputError("no position to touch given: expected at least one")
         self._cameras = tuple(cameras)
-        self._targets = [(name, np.asarray(place, dtype=np.float64)) for name, place in targets.items()]
+        self._targets = list(targets.items())
         self._taught, self._sizes, self._shoulder = taught, sizes, shoulder
         self._period_ns = round(1e9 / rate_hz)
         self._latest: dict[int, tuple[int, BodyKeyPoints]] = {}
@@ -76,7 +76,7 @@ class WebcamTeacher:
         self._resting: Floats | None = None
         self._is_out = False
         self._done = 0
-        self.prompt = f"let your right arm rest; then touch {self._targets[0][0]} with the fingertip, and hold it there"
+        self.prompt = f"let your right arm hang; then touch {self._targets[0][0]} with the fingertip, and hold it there"
 
     @property
     def finished(self) -> bool:
@@ -141,7 +141,7 @@ class WebcamTeacher:
     def _reconstructed(self, track: Sequence[_Seen], target: Floats) -> ArmMovement:
         times = np.array([one.at_ns - track[0].at_ns for one in track]) * 1e-9
         points = [[one.points[number] for one in track] for number in range(len(self._cameras))]
-        known = {"sizes": self._sizes, "shoulder": self._shoulder}
+        known = {"sizes": self._sizes, "shoulder": self._shoulder, "hangs_until_s": 0.5 * STILL_S}
         free = reconstructed(self._cameras, times, points, **known)  # type: ignore[arg-type]
         strange = float((free.sides == 2).mean())
         if strange > MAX_STRANGE:
@@ -158,15 +158,14 @@ class WebcamTeacher:
             self.prompt = "all positions are touched"
             return
         name = self._targets[number][0]
-        self.prompt = f"{number + 1} of {len(self._targets)}: let the arm rest; then touch {name}, and hold it there"
+        self.prompt = f"{number + 1} of {len(self._targets)}: let the arm hang; then touch {name}, and hold it there"
 
 
 def board_targets(corners: ArrayLike) -> dict[str, Floats]:
-    """Nine positions of a board: names, and positions (3,), m, of its inner corners (N, 3) that are nearest to a grid."""
+    """Nine positions of a board: names, and the inner corners of (N, 3), m, that are nearest to a grid."""
     points = np.asarray(corners, dtype=np.float64)
     low, high = points.min(axis=0), points.max(axis=0)
-    names = ("near right", "near middle", "near left", "middle right", "middle", "middle left")
-    names = (*names, "far right", "far middle", "far left")
+    names = [f"{row} {column}".strip() for row in ("near", "middle", "far") for column in ("right", "", "left")]
     places = [(x, y) for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0)]
     wanted = low[:2] + np.array(places) * (high - low)[:2]
     nearest = [int(np.linalg.norm(points[:, :2] - place, axis=1).argmin()) for place in wanted]
@@ -194,5 +193,3 @@ def _hand(seen: _Seen) -> Floats:
     """Of the right arm in the first image, in deviations."""
     first = seen.points[0]
     return np.full(2, np.nan) if first is None else first.positions[0, 3] / first.deviations[0, 0]
-
-

@@ -28,6 +28,7 @@ from paramove.phmm.parametric import TrainingData
 from paramove.phmm.performance import state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
 from paramove.phmm.ridge import smoothed
+from paramove.phmm.stretching import stretched
 
 MAX_STEPS = 40
 STEP_TOLERANCE = 1e-5
@@ -98,8 +99,10 @@ class PolynomialPHMM(ExaminingPHMM):
         performances = self._fitted_performances(data, monomials)
         if performances is not None and self.smoothness is not None:
             averages = self._state_averages(data, trained, monomials)
-            smooth = smoothed(features, monomials.degrees, averages, data.groups)
-            coefficients = smooth.reshape(coefficients.shape)
+            known = stretched(self.description, coefficients.shape, monomials)
+            explained = np.einsum("ndf,kf->knd", known, features).reshape(averages.shape)
+            smooth = smoothed(features, monomials.degrees, averages - explained, data.groups)
+            coefficients = known + smooth.reshape(coefficients.shape)
             trained = with_coefficients(trained, coefficients, data.sequences, features, options)
         self._set_learned(monomials, trained)
         self.performances_ = performances

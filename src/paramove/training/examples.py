@@ -19,6 +19,8 @@ ARM_FLOOR_M = 5e-4
 this much. The arm's base does not move at all; without a floor, points that never move could not be learned."""
 DEPENDENT = 1e-9
 """Smallest variance of a direction, of the largest: below, a point follows from others, and needs the floor as well."""
+ENDS_WITHIN_M = 0.005
+"""Movements that all end so near to their theta are known to end there."""
 PERSONS_FOR_GROUPS = 3
 """With at least this many persons, the cross-validation of training leaves out whole persons."""
 
@@ -96,8 +98,22 @@ class Examples:
         return MovementDescription(
             action=action, point_names=self.point_names, unit="m", frame=self.frame,
             parameter_names=self.parameter_names, duration=float(np.mean(seconds)), source=self.source,
-            rate_hz=self.rate_hz,
+            rate_hz=self.rate_hz, arrival=1.0 if self._ends_at_theta else -1.0,
         )  # fmt: skip
+
+    @property
+    def _ends_at_theta(self) -> bool:
+        """Whether the fingertip, or the middle of fingers and knuckle, always ends where theta says."""
+        if not all(name[-2:] in AXIS_ENDINGS for name in self.parameter_names):
+            return False
+        axes = [AXIS_ENDINGS.index(name[-2:]) for name in self.parameter_names]
+        ends = np.array([sequence[-1] for sequence in self.sequences]).reshape(len(self), -1, 3)[..., axes]
+        for points in (("index",), ("knuckle", "index", "thumb")):
+            if set(points) <= set(self.point_names):
+                where = ends[:, [self.point_names.index(one) for one in points]].mean(axis=1)
+                if np.linalg.norm(where - self.theta, axis=1).max() < ENDS_WITHIN_M:
+                    return True
+        return False
 
 
 def examples_of(

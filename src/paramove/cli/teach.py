@@ -1,0 +1,107 @@
+"""`paramove teach`: demonstrations by showing them to cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from paramove.documents import exit_codes, printable
+
+if TYPE_CHECKING:
+    from paramove.cameras import CalibratedCamera
+    from paramove.observation import BodyKeyPoints, WebcamTeacher
+
+app = typer.Typer(name="teach", no_args_is_help=True, help="Teach a movement by showing it.")
+
+
+@app.callback()
+def _group() -> None:
+    """Teach a movement by showing it."""
+
+
+@app.command()
+def webcam(
+    folder: Annotated[Path, typer.Argument(metavar="SET", help="folder of the demonstration set")],
+    action: Annotated[str, typer.Option("--action", metavar="NAME", help="demonstrated action, such as reach")],
+    square: Annotated[
+        str, typer.Option(metavar="LENGTH", help="side of a square of the board on the table, such as 30mm")
+    ],
+    source: Annotated[
+        list[str],
+        typer.Option(
+            metavar="SOURCE",
+            help="one per camera of the calibration: device:/dev/video0, file:VIDEO; or recording:FILE for all",
+        ),
+    ],
+    targets: Annotated[str, typer.Option(help="what is touched: nine corners of the board")] = "board",
+    cameras: Annotated[Path, typer.Option(metavar="FILE", help="calibration")] = Path("cameras.yaml"),
+    person: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="measures of the person; needed with one camera")
+    ] = None,
+    subject: Annotated[str, typer.Option("--subject", help="person who demonstrates it")] = "",
+    append: Annotated[bool, typer.Option("--append", help="to a set that is there already")] = False,
+) -> None:
+    """Record demonstrations: your arm hangs, then you touch a corner of the board and hold it there; nine times.
+
+    The board lies on the table where the cameras were calibrated with it. A movement begins and ends by itself, is
+    written at once, and a bad one is asked for again. Theta is the touched position, frame of the table.
+
+    Exit codes: 0 all corners were touched; 1 some were not; 66 no calibration, pose network or camera; 78 there is a
+    set already, or one camera and no person; 130 Ctrl-C: movements that have ended are in the set.
+    """
+    from paramove.action_space import read_person
+    from paramove.cameras import Board, read_cameras
+    from paramove.cli.calibrate import length
+    from paramove.demonstrations import DemonstrationError, TaughtSet
+    from paramove.documents import InputError
+    from paramove.observation import WebcamTeacher, board_targets
+
+    if targets != "board":
+        raise _ended(f"--targets {targets!r}: 'board' expected", exit_codes.USAGE)
+    try:
+        calibrated = read_cameras(cameras)
+        taught = TaughtSet(folder, action, subject, "shown to cameras; theta is the touched position", append=append)
+        places = board_targets(Board(length(square, "--square")).corners())
+        who = None if person is None else read_person(person)
+        sizes, shoulder = (None, None) if who is None else (who.sizes, who.shoulder)
+        teacher = WebcamTeacher(calibrated, places, taught, sizes=sizes, shoulder=shoulder)
+        _lead(teacher, _seen(calibrated, source))
+    except (InputError, DemonstrationError) as error:
+        missing = isinstance(error, InputError) and error.missing
+        raise _ended(str(error), exit_codes.INPUT_MISSING if missing else exit_codes.CONFIGURATION) from error
+    except KeyboardInterrupt:
+        raise _ended(f"{folder}: {len(taught.written)} movements", exit_codes.by_signal(2)) from None
+    typer.echo(f"{folder}: {len(taught.written)} new; train a model with `paramove train {folder}`")
+    if not teacher.finished:
+        raise typer.Exit(exit_codes.FAILURE)
+
+
+def _seen(cameras: Sequence[CalibratedCamera], sources: Sequence[str]) -> Iterator[tuple[str, int, BodyKeyPoints]]:
+    from paramove.documents import InputError
+    from paramove.observation import detected_key_points, recorded_key_points
+
+    if sources[0].startswith("recording:"):
+        return recorded_key_points(Path(sources[0].removeprefix("recording:")))
+    if len(sources) != len(cameras):
+        raise InputError(f"{len(cameras)} cameras are calibrated, {len(sources)} sources given: one --source for each")
+    return detected_key_points(cameras, sources, lambda trouble: typer.echo(printable(trouble or "all is well again")))
+
+
+def _lead(teacher: WebcamTeacher, seen: Iterator[tuple[str, int, BodyKeyPoints]]) -> None:
+    """Until all positions are touched, or the images end."""
+    typer.echo(teacher.prompt)
+    for camera, captured_ns, points in seen:
+        happened = teacher.see(camera, captured_ns, points)
+        if happened:
+            typer.echo(printable(happened))
+            typer.echo(teacher.prompt)
+        if teacher.finished:
+            return
+
+
+def _ended(message: str, code: int) -> typer.Exit:
+    typer.echo(printable(message), err=True)
+    return typer.Exit(code)

@@ -1,0 +1,89 @@
+"""Key points of cameras one after the other: live, from video files, or from a recording of a run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from paramove.cameras import CalibratedCamera, EndOfFrames, FrameError, open_source
+from paramove.documents import InputError
+from paramove.observation.body_key_points import BodyKeyPoints, key_points_from
+from paramove.observation.pose_detection import PoseDetection
+from paramove.recording import read
+
+ENDING = "/key_points"
+FILE_STEP_NS = 1_000_000_000 // 15
+"""Files are read at this pace of their own time, as fast as the network is."""
+PAUSE_S = 0.005
+Seen = tuple[str, int, BodyKeyPoints]
+
+
+def recorded_key_points(path: Path) -> Iterator[Seen]:
+    """Camera, capture time, ns, and key points that a recording has. Raises InputError for one that has none."""
+    count = 0
+    try:
+        for one in read(path):
+            if one.topic.endswith(ENDING):
+                count += 1
+                captured_ns = one.message.captured.ToNanoseconds()
+                yield one.topic.removesuffix(ENDING), captured_ns, key_points_from(one.message)
+    except (OSError, KeyError) as error:
+        raise InputError(f"{path}: {error}; a recording of a run expected", missing=not path.exists()) from error
+    if not count:
+        raise InputError(
+            f"{path} has no key points: record with `paramove launch pointing --with real` and the pose network"
+        )
+
+
+def detected_key_points(
+    cameras: Sequence[CalibratedCamera], sources: Sequence[str], tell: Callable[[str], None],
+    networks: Path | None = None,
+) -> Iterator[Seen]:  # fmt: skip
+    """Camera, capture time, ns, and key points of images as they come, until a file ends.
+
+    Args:
+        cameras: As calibrated.
+        sources: One per camera: device:PATH, file:PATH or folder:PATH@RATE; all live or all files.
+        tell: Gets what is wrong with the pictures, when it changes.
+        networks: See `PoseDetection`.
+
+    Raises InputError for a source that cannot be used, and without the pose network.
+    """
+    detection = PoseDetection(networks)
+    if detection.trouble:
+        raise InputError(detection.trouble, missing=True)
+    live = any(source.startswith("device:") for source in sources)
+    opened = [
+        (camera, open_source(source, camera.width_px, camera.height_px))
+        for camera, source in zip(cameras, sources, strict=True)
+    ]
+    now_ns, told = 0, ""
+    try:
+        while True:
+            now_ns = time.monotonic_ns() if live else now_ns + FILE_STEP_NS
+            for camera, source in opened:
+                frame = source.frame(now_ns)
+                if frame is None:
+                    continue
+                size = frame.image_bgr.shape[1::-1]
+                if size != (camera.width_px, camera.height_px):
+                    raise InputError(
+                        f"{camera.name} gives {size[0]} x {size[1]} px, calibrated are {camera.width_px} x "
+                        f"{camera.height_px} px"
+                    )
+                points = detection.detect(camera.name, frame.image_bgr)
+                if points is not None:
+                    yield camera.name, frame.captured_ns, points
+            if detection.trouble != told:
+                told = detection.trouble
+                tell(told)
+            if live:
+                time.sleep(PAUSE_S)
+    except EndOfFrames:
+        return
+    except FrameError as error:
+        raise InputError(str(error)) from error
+    finally:
+        for _, source in opened:
+            source.close()

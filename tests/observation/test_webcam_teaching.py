@@ -1,0 +1,85 @@
+"""A simulated person teaches by touching positions; the set, and what the person is told."""
+
+import numpy as np
+import pytest
+
+from paramove.cameras import Board
+from paramove.demonstrations import DemonstrationError, DemonstrationSet, TaughtSet
+from paramove.documents import InputError
+from paramove.observation import WebcamTeacher, board_targets
+from studies.teaching.experiment import cameras
+from studies.teaching.simulated_person import RATE_HZ, key_points, performance
+
+TARGETS = board_targets(Board(0.03).corners())
+
+
+class Person:
+    """Touches positions before two cameras, one after the other."""
+
+    def __init__(self, folder, targets=TARGETS, **options):
+        self.set = TaughtSet(folder, "reach", "ann", "a test")
+        self.teacher = WebcamTeacher(cameras(2), targets, self.set, rate_hz=RATE_HZ, **options)
+        self.rng, self.frame = np.random.default_rng(4), 0
+
+    def touch(self, target):
+        """What was said while the person did."""
+        poses, said = performance(target, self.rng), []
+        tracks = [key_points(poses, camera, self.rng) for camera in cameras(2)]
+        for now in range(len(poses)):
+            self.frame += 1
+            at_ns = round(self.frame * 1e9 / RATE_HZ)
+            said += [self.teacher.see(f"camera_{n}", at_ns, tracks[n - 1][now]) for n in (2, 1)]
+        return [one for one in said if one]
+
+
+def test_nine_corners_of_a_board():
+    places = np.array(list(TARGETS.values()))
+    assert len(TARGETS) == len(np.unique(places, axis=0)) == 9
+    assert TARGETS["the near right corner"][1] < TARGETS["the near left corner"][1]
+    assert TARGETS["the far right corner"][0] > TARGETS["the near right corner"][0]
+
+
+def test_movements_are_written_as_they_end(tmp_path):
+    two = dict(list(TARGETS.items())[:2])
+    person = Person(tmp_path / "set", two)
+    for number, (name, target) in enumerate(two.items(), start=1):
+        assert name in person.teacher.prompt
+        said = person.touch(target)
+        assert len(said) == 1
+        assert f"taught_00{number}.mcap" in said[0]
+    assert person.teacher.finished
+    written = DemonstrationSet.load(tmp_path / "set")
+    assert len(written) == 2
+    for movement, target in zip(written, two.values(), strict=True):
+        np.testing.assert_allclose(movement.theta, target, rtol=0.0, atol=1e-6)
+        np.testing.assert_allclose(movement.point("index")[-1], target, rtol=0.0, atol=0.006)
+        assert np.linalg.norm(movement.point("index")[0] - target) > 0.2
+        assert 0.5 < movement.duration < 3.0
+    assert written.frame == "table"
+
+
+def test_another_position_is_asked_for_again(tmp_path):
+    person = Person(tmp_path / "set", {"the corner": np.array([0.3, 0.25, 0.0])})
+    said = person.touch([0.15, -0.2, 0.0])
+    assert "left out" in said[0]
+    assert "1 of 1" in person.teacher.prompt
+    assert not (tmp_path / "set" / "labels.yaml").exists()
+    assert "touched" in person.touch([0.3, 0.25, 0.0])[0]
+
+
+def test_the_latest_is_dropped_and_asked_for_again(tmp_path):
+    person = Person(tmp_path / "set")
+    with pytest.raises(DemonstrationError, match="no segment"):
+        person.teacher.drop()
+    name, target = next(iter(TARGETS.items()))
+    person.touch(target)
+    assert person.teacher.drop() == "taught_001.mcap"
+    assert f"1 of 9: let the arm hang; then touch {name}" in person.teacher.prompt
+
+
+def test_one_camera_needs_the_person(tmp_path):
+    written = TaughtSet(tmp_path / "set", "reach", "", "a test")
+    with pytest.raises(InputError, match="measures"):
+        WebcamTeacher(cameras(1), TARGETS, written)
+    with pytest.raises(InputError, match="at least one"):
+        WebcamTeacher(cameras(2), {}, written)
