@@ -25,18 +25,28 @@ EXCHANGED = 0.25
 
 @dataclass(frozen=True)
 class Case:
-    """One way to replay: pictures a second, whether key points are used, fraction of them with exchanged sides."""
+    """One way to replay: pictures a second, whether key points are used, fraction of them with exchanged sides,
+    whether the person was measured by hand or from key points."""
 
     name: str
     rate_hz: float = RATE_HZ
     uses_key_points: bool = True
     exchanged: float = 0.0
+    by_hand: bool = True
 
 
 JUDGED = Case("outline and key points")
 OUTLINE = Case("outline alone", uses_key_points=False)
 SIDES_EXCHANGED = Case("sides exchanged in a quarter", exchanged=EXCHANGED)
-CASES = (JUDGED, OUTLINE, SIDES_EXCHANGED, Case("5 Hz assumed", rate_hz=5.0), Case("30 Hz assumed", rate_hz=30.0))
+NO_RULER = Case("without a ruler", by_hand=False)
+CASES = (
+    JUDGED,
+    OUTLINE,
+    SIDES_EXCHANGED,
+    NO_RULER,
+    Case("5 Hz assumed", rate_hz=5.0),
+    Case("30 Hz assumed", rate_hz=30.0),
+)
 NETWORK = "network alone"
 GOALS: tuple[tuple[str, str, str, float], ...] = (
     (JUDGED.name, "frames 32-50", "median_px", 6.0),
@@ -47,6 +57,9 @@ GOALS: tuple[tuple[str, str, str, float], ...] = (
     (JUDGED.name, "all frames", "hand_cm", 9.0),
     (JUDGED.name, "all frames", "from_shoulder_cm", 8.0),
     (JUDGED.name, "all frames", "direction_deg", 6.0),
+    (NO_RULER.name, "all frames", "hand_cm", 10.5),
+    (NO_RULER.name, "all frames", "from_shoulder_cm", 8.2),
+    (NO_RULER.name, "all frames", "direction_deg", 8.0),
 )
 """Case, frames, number, and the most that its mean over the seeds may be."""
 
@@ -78,11 +91,21 @@ def run_all(
 ) -> list[Replay]:  # fmt: skip
     """Replays; the reference is compared with each after it has ended. Raises InputError for a recording of no use."""
     camera = seated_person.camera(folder)
+    measured = None
+    if not all(case.by_hand for case in cases):
+        measured = seated_person.without_ruler(camera, key_points, float(reference.shoulder[0, 2]))
     replays = []
     for case in cases:
         for seed in seeds:
             points = exchanged(key_points, case.exchanged, seed) if case.uses_key_points else ()
-            estimates = replayed(folder, points, rate_hz=case.rate_hz, seed=seed, models=models)
+            estimates = replayed(
+                folder,
+                points,
+                rate_hz=case.rate_hz,
+                seed=seed,
+                models=models,
+                person=None if case.by_hand else measured,
+            )
             replays.append(Replay(case, seed, estimates, distances(estimates, reference, camera)))
             done(f"{case.name}, seed {seed}")
     return replays

@@ -32,6 +32,7 @@ from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.observation import ArmObserver, BodyKeyPoints, PoseNetwork, key_points_from, key_points_message
 from studies.real_images import seated_person
 from studies.real_images.pointing_model import NAME, pointing_action
+from studies.real_images.seated_person import Measures
 
 IMAGES = "color"
 RATE_HZ = 10.0
@@ -61,7 +62,7 @@ class ReplayedEstimate:
 
 def replayed(
     folder: Path, key_points: Sequence[BodyKeyPoints] = (), *, rate_hz: float = RATE_HZ, seed: int = 0,
-    models: Path | None = None,
+    models: Path | None = None, person: Measures | None = None,
 ) -> list[ReplayedEstimate]:  # fmt: skip
     """All frames of the recording of a folder. Raises InputError where something of it is missing.
 
@@ -69,9 +70,10 @@ def replayed(
         key_points: of each picture; none to track by the outline alone.
         rate_hz: assumed pictures a second. seed: of the filter.
         models: folder of the trained model; by default the user's cache.
+        person: measures; by default those that were set by hand.
     """
     camera = seated_person.camera(folder)
-    tracker = video_tracker(camera, rate_hz, seed, models)
+    tracker = video_tracker(camera, person or seated_person.by_hand(camera), rate_hz, seed, models)
     estimates = []
     for index, image in camera_messages(folder / IMAGES, camera, rate_hz):
         at_ns = image.timestamp.ToNanoseconds()
@@ -84,15 +86,17 @@ def replayed(
     return estimates
 
 
-def video_tracker(camera: CalibratedCamera, rate_hz: float, seed: int, models: Path | None) -> VideoTracker:
+def video_tracker(
+    camera: CalibratedCamera, person: Measures, rate_hz: float, seed: int, models: Path | None
+) -> VideoTracker:
     """The tracker as the node makes one: seated pointing in a loop, and directions that may slide on."""
-    placement = seated_person.placement(camera)
-    action = pointing_action(seated_person.SIZES, seated_person.resting_pose(camera), placement, models)
+    placement = person.placement
+    action = pointing_action(person.sizes, person.resting, placement, models)
     options = TrackerOptions(
         filter=FilterOptions(n_particles=PARTICLES), propagation=PropagationOptions(retargeted=RETARGETED)
     )
     tracker = ActionTracker(Vocabulary([action]), Grammar.loop(NAME), placement, options, seed)
-    return VideoTracker(tracker, ArmObserver(seated_person.SIZES, [camera]), [camera], 1.0 / rate_hz)
+    return VideoTracker(tracker, ArmObserver(person.sizes, [camera]), [camera], 1.0 / rate_hz)
 
 
 def camera_messages(pictures: Path, camera: CalibratedCamera, rate_hz: float) -> Iterator[tuple[int, CompressedImage]]:

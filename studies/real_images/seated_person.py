@@ -8,15 +8,17 @@ image there, median over 7 x 7 px.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from paramove.action_space import PersonPlacement
+from paramove.action_space import Person, PersonPlacement
 from paramove.cameras import CalibratedCamera
 from paramove.demonstrations import unit
 from paramove.documents import Floats, InputError
-from paramove.observation import ArmSizes, fitted_poses
+from paramove.observation import ArmSizes, BodyKeyPoints, fitted_poses, measured_arm
 
 INTRINSICS = "cam_params_realsense.json"
 
@@ -33,6 +35,8 @@ ELBOW_PX, ELBOW_DEPTH = (213.0, 150.0), 2.19
 """Middle of the sleeve where it bends; surface 2.15 m and 0.04 m."""
 FINGERTIP_PX, FINGERTIP_DEPTH = (238.0, 200.0), 1.97
 """Lower end of the hand on the knee; surface 1.956 m and 0.01 m."""
+SETTING_UP = 41
+"""Frames from which a person without a ruler is measured."""
 SIZES = ArmSizes(
     upper_arm=0.28,  # of a person of 1.70 m (shoulder 0.92 m over the floor when seated, knee 0.55 m); the sleeve
     forearm=0.25,  # foreshortens too much in frame 0 to be measured there
@@ -62,9 +66,29 @@ def camera(folder: Path) -> CalibratedCamera:
     return CalibratedCamera("camera_1", width, height, matrix, np.zeros(0), _camera_from_world())
 
 
-def placement(camera: CalibratedCamera) -> PersonPlacement:
-    """The resting shoulder and how large the arm is."""
-    return PersonPlacement.of_arm(in_world(SHOULDER_PX, SHOULDER_DEPTH, camera), SIZES.length)
+@dataclass(frozen=True)
+class Measures:
+    """Of the person. sizes: of the arm. resting: shoulder, elbow, fingertip with the hand on the knee, (9,), m."""
+
+    sizes: ArmSizes
+    resting: Floats
+
+    @property
+    def placement(self) -> PersonPlacement:
+        """The resting shoulder and how large the arm is."""
+        return PersonPlacement.of_arm(self.resting[:3], self.sizes.length)
+
+
+def by_hand(camera: CalibratedCamera) -> Measures:
+    """From the numbers above."""
+    return Measures(SIZES, resting_pose(camera))
+
+
+def without_ruler(camera: CalibratedCamera, key_points: Sequence[BodyKeyPoints], distance: float) -> Measures:
+    """From key points of the first frames, with the shoulder's distance, m, as a board held at the chest gives it."""
+    arm = measured_arm(camera, key_points[:SETTING_UP], distance=distance)
+    person = Person(shoulder=tuple(arm.shoulder), upper_arm=arm.upper_arm, forearm=arm.forearm, hand=arm.hand)
+    return Measures(person.sizes, fitted_poses(arm.resting[None], person.sizes)[0])
 
 
 def resting_pose(camera: CalibratedCamera) -> Floats:

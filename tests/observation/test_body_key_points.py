@@ -9,12 +9,17 @@ from paramove.observation import ARM_POINTS, BodyKeyPoints, key_points_from, key
 def some_points(seed=0):
     rng = np.random.default_rng(seed)
     return BodyKeyPoints(
-        rng.uniform(0, 640, (2, 4, 2)), rng.uniform(1, 6, (2, 4)), rng.normal(0, 0.2, (2, 4)), rng.random((2, 4)), 0.9
+        rng.uniform(0, 640, (2, 4, 2)),
+        rng.uniform(1, 6, (2, 4)),
+        rng.normal(0, 0.2, (2, 4)),
+        rng.random((2, 4)),
+        0.9,
+        280.0,
     )
 
 
 def same(one, other):
-    for name in ("positions", "deviations", "depths", "certainties", "certainty"):
+    for name in ("positions", "deviations", "depths", "certainties", "certainty", "px_per_m"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 

@@ -17,6 +17,7 @@ from .calibration_images import file_source as file_source
 from .charuco_board import MARKERS as MARKERS
 from .charuco_board import UNSIZED_BOARD_ID as UNSIZED_BOARD_ID
 from .charuco_board import Board as Board
+from .charuco_board import BoardFinder as BoardFinder
 from .charuco_board import BoardView as BoardView
 from .charuco_board import dictionary as dictionary
 from .charuco_sheet import PAPERS as PAPERS
@@ -32,6 +33,7 @@ from .frames import FrameError as FrameError
 from .frames import decode as decode
 from .frames import encode as encode
 from .placement import Placement as Placement
+from .placement import board_depth as board_depth
 from .placement import place_camera as place_camera
 from .replayed_frames import PICTURES as PICTURES
 from .stereo import StereoRig as StereoRig

@@ -71,6 +71,14 @@ def place_camera(lens: Lens, views: Sequence[BoardView], board: Board) -> Placem
     return Placement(camera, error_px, position_sd, turn_sd)
 
 
+def board_depth(camera: CalibratedCamera, view: BoardView, board: Board) -> float:
+    """Depth of the middle of a board that is held before a calibrated camera, m along its axis."""
+    corners = board.corners()[view.corner_ids]
+    _, rotation, shift = cv2.solvePnP(corners, view.points, camera.matrix, camera.distortion)
+    middle = cv2.Rodrigues(rotation)[0] @ board.corners().mean(axis=0) + shift.ravel()
+    return float(middle[2])
+
+
 def _check_views(lens: Lens, views: Sequence[BoardView]) -> None:
     if not views:
         raise CalibrationError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +11,6 @@ import typer
 from paramove.documents import exit_codes, printable
 
 if TYPE_CHECKING:
-    from paramove.cameras import CalibratedCamera
     from paramove.observation import BodyKeyPoints, WebcamTeacher
 
 app = typer.Typer(name="teach", no_args_is_help=True, help="Teach a movement by showing it.")
@@ -55,6 +54,7 @@ def webcam(
     from paramove.action_space import read_person
     from paramove.cameras import Board, read_cameras
     from paramove.cli.calibrate import length
+    from paramove.cli.webcam import seen_by
     from paramove.demonstrations import DemonstrationError, TaughtSet
     from paramove.documents import InputError
     from paramove.observation import WebcamTeacher, board_targets
@@ -68,7 +68,7 @@ def webcam(
         who = None if person is None else read_person(person)
         sizes, shoulder = (None, None) if who is None else (who.sizes, who.shoulder)
         teacher = WebcamTeacher(calibrated, places, taught, sizes=sizes, shoulder=shoulder)
-        _lead(teacher, _seen(calibrated, source))
+        _lead(teacher, seen_by(calibrated, source))
     except (InputError, DemonstrationError) as error:
         missing = isinstance(error, InputError) and error.missing
         raise _ended(str(error), exit_codes.INPUT_MISSING if missing else exit_codes.CONFIGURATION) from error
@@ -77,17 +77,6 @@ def webcam(
     typer.echo(f"{folder}: {len(taught.written)} new; train a model with `paramove train {folder}`")
     if not teacher.finished:
         raise typer.Exit(exit_codes.FAILURE)
-
-
-def _seen(cameras: Sequence[CalibratedCamera], sources: Sequence[str]) -> Iterator[tuple[str, int, BodyKeyPoints]]:
-    from paramove.documents import InputError
-    from paramove.observation import detected_key_points, recorded_key_points
-
-    if sources[0].startswith("recording:"):
-        return recorded_key_points(Path(sources[0].removeprefix("recording:")))
-    if len(sources) != len(cameras):
-        raise InputError(f"{len(cameras)} cameras are calibrated, {len(sources)} sources given: one --source for each")
-    return detected_key_points(cameras, sources, lambda trouble: typer.echo(printable(trouble or "all is well again")))
 
 
 def _lead(teacher: WebcamTeacher, seen: Iterator[tuple[str, int, BodyKeyPoints]]) -> None:

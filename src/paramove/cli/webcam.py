@@ -1,15 +1,26 @@
-"""`paramove webcam`: what tracking with a webcam needs once."""
+"""`paramove webcam`: what tracking with a webcam needs once: the pose network, and the person's measures."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.documents import exit_codes
+from paramove.documents import exit_codes, printable
+
+if TYPE_CHECKING:
+    from paramove.cameras import CalibratedCamera
+    from paramove.documents import Image
+    from paramove.observation import BodyKeyPoints, MeasuredArm
 
 app = typer.Typer(name="webcam", no_args_is_help=True, help="Track a person with a webcam.")
+
+SOURCE = "device:/dev/video0, file:VIDEO, folder:PICTURES@RATE, or recording:FILE of a run"
+BOARD_LOOKS = 5
+CHEST_M = 0.08
+"""The joints of the shoulders are so much farther away than a board that is held at the chest."""
 
 
 @app.callback()
@@ -34,6 +45,124 @@ def setup(
         folder = fetch_networks(wheel)
         stored_network(folder)
     except InputError as error:
-        typer.echo(str(error), err=True)
-        raise typer.Exit(exit_codes.INPUT_MISSING) from error
+        raise _ended(str(error), exit_codes.INPUT_MISSING) from error
     typer.echo(f"the pose network is in {folder}")
+
+
+@app.command()
+def person(
+    out: Annotated[Path, typer.Option(metavar="FILE", help="YAML file to write; an existing one is overwritten")],
+    source: Annotated[str, typer.Option(metavar="SOURCE", help=SOURCE)],
+    cameras: Annotated[Path, typer.Option(metavar="FILE", help="calibration; the first camera is used")] = Path(
+        "cameras.yaml"
+    ),
+    square: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="of the board, which you then hold at your chest: best")
+    ] = None,
+    distance: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="of your right shoulder from the camera, such as 1.5m")
+    ] = None,
+    height: Annotated[str | None, typer.Option(metavar="LENGTH", help="your height, such as 1.75m")] = None,
+) -> None:
+    """Measure a person without a ruler: follow the prompts for ten seconds.
+
+    How large you are follows from the board at your chest, from the distance or from your height; without any, from
+    the height of a mean adult.
+
+    Exit codes: 0 written; 1 the images ended before; 66 no calibration, pose network or camera; 77 not allowed to
+    write; 78 a length without unit, or images of no use.
+    """
+    from paramove.cameras import read_cameras
+    from paramove.cli.calibrate import length
+    from paramove.documents import InputError
+    from paramove.observation import PersonSetUp
+
+    try:
+        camera = read_cameras(cameras)[0]
+        far = None if distance is None else length(distance, "--distance")
+        tall = None if height is None else length(height, "--height")
+        images = None if source.startswith("recording:") else _images(camera, source)
+        if square is not None:
+            far = _at_chest(camera, images, length(square, "--square"))
+        set_up = PersonSetUp(camera, distance=far, height=tall)
+        typer.echo(set_up.prompt)
+        for _, _, points in seen_by([camera], [source], images):
+            happened = set_up.see(points)
+            if happened:
+                typer.echo(printable(happened))
+                typer.echo(set_up.prompt)
+            if set_up.arm is not None:
+                break
+        if set_up.arm is None:
+            raise _ended("the images ended before the person was measured", exit_codes.FAILURE)
+        _write(out, set_up.arm)
+    except InputError as error:
+        code = exit_codes.INPUT_MISSING if error.missing else exit_codes.CONFIGURATION
+        raise _ended(str(error), code) from error
+    except OSError as error:
+        raise _ended(f"{error.filename or out}: {error.strerror}", exit_codes.PERMISSION) from error
+    typer.echo(f"{out}: written; the shoulder is in the frame of the table")
+
+
+def _images(camera: CalibratedCamera, source: str) -> Iterator[tuple[CalibratedCamera, int, Image]]:
+    from paramove.observation import images_of
+
+    return images_of([camera], [source])
+
+
+def _at_chest(
+    camera: CalibratedCamera, images: Iterator[tuple[CalibratedCamera, int, Image]] | None, square: float
+) -> float:
+    """Distance of the shoulder, m, by a board that is held at the chest."""
+    import numpy as np
+
+    from paramove.cameras import Board, BoardFinder, board_depth
+    from paramove.documents import InputError
+
+    if images is None:
+        raise InputError("--square needs images of the board: a recording of key points has none")
+    typer.echo("hold the board flat at your chest, towards the camera")
+    finder, depths = BoardFinder(), list[float]()
+    for _, _, image in images:
+        view = finder.find(image)
+        if view is not None:
+            depths.append(board_depth(camera, view, Board(square)))
+        if len(depths) == BOARD_LOOKS:
+            break
+    if len(depths) < BOARD_LOOKS:
+        raise InputError("the images ended before the board was seen at the chest")
+    far = float(np.median(depths)) + CHEST_M
+    typer.echo(f"your shoulder is {far:.2f} m from the camera; put the board away")
+    return far
+
+
+def _write(path: Path, arm: MeasuredArm) -> None:
+    from ruamel.yaml import YAML
+
+    from paramove.documents import replacing
+
+    measures = {name: round(getattr(arm, name), 3) for name in ("upper_arm", "forearm", "hand")}
+    content = {"shoulder": [round(float(value), 3) for value in arm.shoulder], **measures}
+    with replacing(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
+        YAML().dump(content, file)
+
+
+def seen_by(
+    cameras: Sequence[CalibratedCamera], sources: Sequence[str],
+    images: Iterator[tuple[CalibratedCamera, int, Image]] | None = None,
+) -> Iterator[tuple[str, int, BodyKeyPoints]]:  # fmt: skip
+    """Camera, capture time, ns, and key points of images, or of sources as named on the command line."""
+    from paramove.documents import InputError
+    from paramove.observation import detected_key_points, images_of, recorded_key_points
+
+    if sources[0].startswith("recording:"):
+        return recorded_key_points(Path(sources[0].removeprefix("recording:")))
+    if len(sources) != len(cameras):
+        raise InputError(f"{len(cameras)} cameras are calibrated, {len(sources)} sources given: one --source for each")
+    images = images_of(cameras, sources) if images is None else images
+    return detected_key_points(images, lambda trouble: typer.echo(printable(trouble or "all is well again")))
+
+
+def _ended(message: str, code: int) -> typer.Exit:
+    typer.echo(printable(message), err=True)
+    return typer.Exit(code)

@@ -25,15 +25,15 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#paramove/msgs/body_key_points.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"y\n\rBodyKeyPoints\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x11\n\tcertainty\x18\x02 \x01(\x01\x12\'\n\x06points\x18\x03 \x03(\x0b\x32\x17.paramove.msgs.KeyPoint\"c\n\x08KeyPoint\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\t\n\x01x\x18\x02 \x01(\x01\x12\t\n\x01y\x18\x03 \x01(\x01\x12\x11\n\tdeviation\x18\x04 \x01(\x01\x12\r\n\x05\x64\x65pth\x18\x05 \x01(\x01\x12\x11\n\tcertainty\x18\x06 \x01(\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#paramove/msgs/body_key_points.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\x8b\x01\n\rBodyKeyPoints\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x11\n\tcertainty\x18\x02 \x01(\x01\x12\'\n\x06points\x18\x03 \x03(\x0b\x32\x17.paramove.msgs.KeyPoint\x12\x10\n\x08px_per_m\x18\x04 \x01(\x01\"c\n\x08KeyPoint\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\t\n\x01x\x18\x02 \x01(\x01\x12\t\n\x01y\x18\x03 \x01(\x01\x12\x11\n\tdeviation\x18\x04 \x01(\x01\x12\r\n\x05\x64\x65pth\x18\x05 \x01(\x01\x12\x11\n\tcertainty\x18\x06 \x01(\x01\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'paramove.msgs.body_key_points_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_BODYKEYPOINTS']._serialized_start=87
-  _globals['_BODYKEYPOINTS']._serialized_end=208
-  _globals['_KEYPOINT']._serialized_start=210
-  _globals['_KEYPOINT']._serialized_end=309
+  _globals['_BODYKEYPOINTS']._serialized_start=88
+  _globals['_BODYKEYPOINTS']._serialized_end=227
+  _globals['_KEYPOINT']._serialized_start=229
+  _globals['_KEYPOINT']._serialized_end=328
 # @@protoc_insertion_point(module_scope)

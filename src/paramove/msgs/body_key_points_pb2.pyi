@@ -7,14 +7,16 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class BodyKeyPoints(_message.Message):
-    __slots__ = ("captured", "certainty", "points")
+    __slots__ = ("captured", "certainty", "points", "px_per_m")
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     CERTAINTY_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
+    PX_PER_M_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     certainty: float
     points: _containers.RepeatedCompositeFieldContainer[KeyPoint]
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., certainty: _Optional[float] = ..., points: _Optional[_Iterable[_Union[KeyPoint, _Mapping]]] = ...) -> None: ...
+    px_per_m: float
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., certainty: _Optional[float] = ..., points: _Optional[_Iterable[_Union[KeyPoint, _Mapping]]] = ..., px_per_m: _Optional[float] = ...) -> None: ...
 
 class KeyPoint(_message.Message):
     __slots__ = ("name", "x", "y", "deviation", "depth", "certainty")

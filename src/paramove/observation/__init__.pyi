@@ -18,6 +18,7 @@ from .body_tracking import BodyTrackingSetup as BodyTrackingSetup
 from .key_point_observer import KeyPointObserver as KeyPointObserver
 from .key_point_observer import KeyPointOptions as KeyPointOptions
 from .key_point_stream import detected_key_points as detected_key_points
+from .key_point_stream import images_of as images_of
 from .key_point_stream import recorded_key_points as recorded_key_points
 from .markers import DEFAULT_MARKERS as DEFAULT_MARKERS
 from .markers import ArucoMarker as ArucoMarker
@@ -27,6 +28,9 @@ from .network_files import fetch_networks as fetch_networks
 from .network_files import stored_network as stored_network
 from .options import Likelihood as Likelihood
 from .options import ObservationOptions as ObservationOptions
+from .person_measures import MeasuredArm as MeasuredArm
+from .person_measures import measured_arm as measured_arm
+from .person_set_up import PersonSetUp as PersonSetUp
 from .pose_detection import PoseDetection as PoseDetection
 from .pose_network import PoseNetwork as PoseNetwork
 from .presence import Presence as Presence

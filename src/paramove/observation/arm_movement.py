@@ -132,10 +132,11 @@ def _see(
         rows[:, 3 * point : 3 * point + 3] = slopes
         system.add(frame, rows, off, weights[point] / seen.deviations[side, point] ** 2)
         deviation = comparing.options.depths[point]
-        if np.isfinite(deviation) and np.isfinite(seen.depths[side, point]):
+        depth = seen.depths_at(local[SHOULDER, 2], scale[0])[side, point]
+        if np.isfinite(deviation) and np.isfinite(depth):
             row = np.zeros((1, DIMENSIONS))
             row[0, 3 * point : 3 * point + 3], row[0, :3] = turn[2], -turn[2]
-            behind = seen.depths[side, point] - (z - local[SHOULDER, 2])
+            behind = depth - (z - local[SHOULDER, 2])
             system.add(frame, row, np.array([behind]), weights[point] / deviation**2)
     return side
 
@@ -238,6 +239,7 @@ def _along_rays(camera: CalibratedCamera, seen: BodyKeyPoints | None, shoulder: 
     if seen is None:
         return np.full((POINTS, 3), np.nan)
     turn, shift = camera.camera_from_world[:3, :3], camera.camera_from_world[:3, 3]
-    depth = (turn @ shoulder + shift)[2] + seen.depths[0]
+    away = float((turn @ shoulder + shift)[2])
+    depth = away + seen.depths_at(away, camera.matrix[0, 0])[0]
     rays = np.column_stack([seen.positions[0], np.ones(POINTS)]) @ np.linalg.inv(camera.matrix).T
     return np.asarray((depth[:, None] * rays - shift) @ turn)

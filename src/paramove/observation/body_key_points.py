@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
 from paramove.msgs.body_key_points_pb2 import BodyKeyPoints as BodyKeyPointsMessage
@@ -24,9 +25,11 @@ class BodyKeyPoints:
     Attributes:
         positions: (2, 4, 2), px; NaN where a point is unknown.
         deviations: Along each axis, (2, 4), px.
-        depths: How much farther from the camera than the shoulder of that arm, (2, 4), m.
+        depths: How much farther from the camera than the shoulder of that arm, (2, 4), m of the size that the network
+            believes the person has.
         certainties: That a point is visible, (2, 4), 0 to 1.
         certainty: That there is a person, 0 to 1.
+        px_per_m: How large the person of that size is in the image, px/m; 0 if unknown.
     """
 
     positions: Floats
@@ -34,6 +37,7 @@ class BodyKeyPoints:
     depths: Floats
     certainties: Floats
     certainty: float
+    px_per_m: float = 0.0
 
     @classmethod
     def nobody(cls, certainty: float = 0.0) -> BodyKeyPoints:
@@ -50,13 +54,19 @@ class BodyKeyPoints:
     def exchanged(self) -> BodyKeyPoints:
         """Right and left exchanged."""
         return BodyKeyPoints(
-            self.positions[::-1], self.deviations[::-1], self.depths[::-1], self.certainties[::-1], self.certainty
-        )
+            self.positions[::-1], self.deviations[::-1], self.depths[::-1], self.certainties[::-1], self.certainty,
+            self.px_per_m,
+        )  # fmt: skip
+
+    def depths_at(self, shoulder_m: ArrayLike, focal_px: float) -> Floats:
+        """`depths` in true metres, (..., 2, 4), of a person whose shoulder is at these depths (...), m."""
+        away = np.asarray(shoulder_m, dtype=np.float64)[..., None, None]
+        return self.depths * (self.px_per_m * away / focal_px if self.px_per_m else np.ones_like(away))
 
 
 def key_points_message(points: BodyKeyPoints, captured_ns: int) -> BodyKeyPointsMessage:
     """The known points."""
-    message = BodyKeyPointsMessage(certainty=points.certainty)
+    message = BodyKeyPointsMessage(certainty=points.certainty, px_per_m=points.px_per_m)
     message.captured.FromNanoseconds(captured_ns)
     for name, at in NAMES.items():
         x, y = points.positions[at]
@@ -78,4 +88,5 @@ def key_points_from(message: BodyKeyPointsMessage) -> BodyKeyPoints:
         if at is not None and (values <= LARGEST).all() and one.deviation > 0.0:  # NaN is not
             points.positions[at], points.certainties[at] = (one.x, one.y), one.certainty
             deviations[at], depths[at] = one.deviation, one.depth
-    return BodyKeyPoints(points.positions, deviations, depths, points.certainties, points.certainty)
+    size = message.px_per_m if 0.0 < message.px_per_m <= LARGEST[0] else 0.0
+    return BodyKeyPoints(points.positions, deviations, depths, points.certainties, points.certainty, size)

@@ -169,7 +169,8 @@ class KeyPointObserver:
         with np.errstate(invalid="ignore", divide="ignore"):
             spread = 1.0 + (self._model_px(arm, camera, model) / points.deviations[side]) ** 2
             squared = ((camera.project(arm) - points.positions[side]) ** 2).sum(axis=2) / points.deviations[side] ** 2
-            behind = (ahead - ahead[:, :1] - points.depths[side]) / self.options.depths
+            depths = points.depths_at(ahead[:, 0], camera.matrix[0, 0])[:, side]
+            behind = (ahead - ahead[:, :1] - depths) / self.options.depths
             own = -0.5 * squared / spread - np.log(2.0 * np.pi * spread) - 0.5 * np.nan_to_num(behind) ** 2
         own = np.where(np.isfinite(own) & (ahead > 0.0), own, -np.inf) + np.log1p(-self.options.outlier)
         total = np.logaddexp(own, np.log(self.options.outlier) + ELSEWHERE)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from paramove.cameras import CalibratedCamera, EndOfFrames, FrameError, open_source
-from paramove.documents import InputError
+from paramove.documents import Image, InputError
 from paramove.observation.body_key_points import BodyKeyPoints, key_points_from
 from paramove.observation.pose_detection import PoseDetection
 from paramove.recording import read
@@ -36,29 +36,23 @@ def recorded_key_points(path: Path) -> Iterator[Seen]:
         )
 
 
-def detected_key_points(
-    cameras: Sequence[CalibratedCamera], sources: Sequence[str], tell: Callable[[str], None],
-    networks: Path | None = None,
-) -> Iterator[Seen]:  # fmt: skip
-    """Camera, capture time, ns, and key points of images as they come, until a file ends.
+def images_of(
+    cameras: Sequence[CalibratedCamera], sources: Sequence[str]
+) -> Iterator[tuple[CalibratedCamera, int, Image]]:
+    """Camera, capture time, ns, and image as they come, until a file ends.
 
     Args:
         cameras: As calibrated.
         sources: One per camera: device:PATH, file:PATH or folder:PATH@RATE; all live or all files.
-        tell: Gets what is wrong with the pictures, when it changes.
-        networks: See `PoseDetection`.
 
-    Raises InputError for a source that cannot be used, and without the pose network.
+    Raises InputError for a source that cannot be used.
     """
-    detection = PoseDetection(networks)
-    if detection.trouble:
-        raise InputError(detection.trouble, missing=True)
     live = any(source.startswith("device:") for source in sources)
     opened = [
         (camera, open_source(source, camera.width_px, camera.height_px))
         for camera, source in zip(cameras, sources, strict=True)
     ]
-    now_ns, told = 0, ""
+    now_ns = 0
     try:
         while True:
             now_ns = time.monotonic_ns() if live else now_ns + FILE_STEP_NS
@@ -72,12 +66,7 @@ def detected_key_points(
                         f"{camera.name} gives {size[0]} x {size[1]} px, calibrated are {camera.width_px} x "
                         f"{camera.height_px} px"
                     )
-                points = detection.detect(camera.name, frame.image_bgr)
-                if points is not None:
-                    yield camera.name, frame.captured_ns, points
-            if detection.trouble != told:
-                told = detection.trouble
-                tell(told)
+                yield camera, frame.captured_ns, frame.image_bgr
             if live:
                 time.sleep(PAUSE_S)
     except EndOfFrames:
@@ -87,3 +76,27 @@ def detected_key_points(
     finally:
         for _, source in opened:
             source.close()
+
+
+def detected_key_points(
+    images: Iterator[tuple[CalibratedCamera, int, Image]], tell: Callable[[str], None], networks: Path | None = None
+) -> Iterator[Seen]:
+    """Camera, capture time, ns, and key points of images.
+
+    Args:
+        images: See `images_of`.
+        tell: Gets what is wrong with the pictures, when it changes.
+        networks: See `PoseDetection`.
+
+    Raises InputError without the pose network.
+    """
+    detection, told = PoseDetection(networks), ""
+    if detection.trouble:
+        raise InputError(detection.trouble, missing=True)
+    for camera, captured_ns, image in images:
+        points = detection.detect(camera.name, image)
+        if points is not None:
+            yield camera.name, captured_ns, points
+        if detection.trouble != told:
+            told = detection.trouble
+            tell(told)

@@ -23,6 +23,8 @@ ARMS = np.array([[12, 14, 16, 20], [11, 13, 15, 19]])
 """Rows of shoulder, elbow, wrist, knuckle of the index finger among the landmarks; right arm, left arm."""
 LITTLE_FINGER = np.array([18, 17])
 """Rows of the knuckle of the little finger."""
+TRUNK = np.array([11, 12, 13, 14, 15, 16, 23, 24])
+"""Rows of shoulders, elbows, wrists and hips, which show how large a person is."""
 CENTRE, TOP = 33, 34
 """Rows of the middle of the hips, and of a point as far from it as the person is large, upwards."""
 BODY_SIDE = 2.5
@@ -181,11 +183,16 @@ class PoseNetwork:
         size = float(np.hypot(*up))
         if not (certainty >= MIN_PERSON and np.isfinite(rows).all() and 2.0 < size < 4.0 * max(image.shape)):
             return BodyKeyPoints.nobody(certainty), None
-        positions, depths = in_image[ARMS], world.reshape(-1, 3)[ARMS, 2].astype(np.float64)
+        body = world.reshape(-1, 3).astype(np.float64)
+        positions, depths = in_image[ARMS], body[ARMS, 2]
+        spread_px, spread_m = (
+            float(np.linalg.norm(one[TRUNK] - one[TRUNK].mean(axis=0))) for one in (in_image, body[:, :2])
+        )
         positions[:, 3] = (in_image[ARMS[:, 3]] + in_image[LITTLE_FINGER]) / 2.0
         certainties = _sigmoid(rows[ARMS, 3]) * _sigmoid(rows[ARMS, 4])
         deviations = np.tile(NOISE_PX * crop.side_px / POSE_PX, (len(ARMS), 1))
-        found = BodyKeyPoints(positions, deviations, depths - depths[:, :1], certainties, certainty)
+        px_per_m = spread_px / max(spread_m, 1e-3)
+        found = BodyKeyPoints(positions, deviations, depths - depths[:, :1], certainties, certainty, px_per_m)
         return found, Crop(in_image[CENTRE], BODY_SIDE * size, float(np.arctan2(up[0], -up[1])))
 
     def _refine(self, image: Image, found: BodyKeyPoints, side: int) -> None:

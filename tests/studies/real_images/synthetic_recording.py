@@ -26,7 +26,7 @@ def write_lens(folder: Path) -> CalibratedCamera:
 
 def true_poses(camera: CalibratedCamera, theta: tuple[float, float] = (0.8, 0.5)) -> np.ndarray:
     """At 10 Hz: half a second on the knee, then to a direction, and held. (T, 9), m, in the world."""
-    placement = seated_person.placement(camera)
+    placement = seated_person.by_hand(camera).placement
     rest = placement.in_model(seated_person.resting_pose(camera))
     arm = seated_person.SIZES.scaled(1.0 / placement.scale)
     shown = pointing_model.movement(np.array(theta), arm, rest, np.random.default_rng(5))

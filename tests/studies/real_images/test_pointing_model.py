@@ -11,7 +11,7 @@ from tests.studies.real_images.synthetic_recording import write_lens
 @pytest.fixture(scope="module")
 def person(tmp_path_factory):
     camera = write_lens(tmp_path_factory.mktemp("lens"))
-    placement = seated_person.placement(camera)
+    placement = seated_person.by_hand(camera).placement
     rest = seated_person.resting_pose(camera)
     return placement, rest, seated_person.SIZES.scaled(1.0 / placement.scale)
 

@@ -1,0 +1,138 @@
+"""A person measured without a ruler: arm lengths and shoulder from key points of a few seconds of movement.
+
+One camera does not see how large things are. The scale comes from the distance of the shoulder (a board held at the
+chest, a depth image), or from the person's height.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramove.cameras import CalibratedCamera
+from paramove.documents import Floats, InputError
+from paramove.observation.body_key_points import ARM_POINTS, BodyKeyPoints
+
+MIN_IMAGES = 20
+"""Of a person with the whole right arm in view."""
+LENGTHS_SD, DISTANCE_SD, HEIGHT_SD = 0.02, 0.04, 0.05
+"""Deviation of a bone's length, m; of the shoulder's distance, m, and of lengths from the height, as a fraction."""
+UPPER_ARM_OF_HEIGHT, FOREARM_OF_HEIGHT = 0.16, 0.14
+"""Between the network's joints, of the height: together 0.28 to 0.32 of three measured persons."""
+HAND_OF_FOREARM = 0.72
+"""Wrist to fingertip; a closed hand does not show it."""
+LIMITS_M = {"upper_arm": (0.15, 0.45), "forearm": (0.15, 0.40), "hand": (0.10, 0.28)}
+MEAN_HEIGHT_M, ANY_HEIGHT_SD = 1.70, 0.06
+"""Of adults, where nothing is known, and its deviation as a fraction."""
+RESTING_IMAGES = 9
+"""The first so many images show the resting arm."""
+
+
+@dataclass(frozen=True)
+class MeasuredArm:
+    """Measures of a person.
+
+    Attributes:
+        upper_arm, forearm, hand: m; the hand to the tip of the stretched index finger.
+        resting: Shoulder, elbow, fingertip of the resting arm, (9,), m, in the world.
+        length_deviation: Of the lengths, m.
+        distance_deviation: Of the shoulder along the line of sight, m.
+    """
+
+    upper_arm: float
+    forearm: float
+    hand: float
+    resting: Floats
+    length_deviation: float
+    distance_deviation: float
+
+    @property
+    def shoulder(self) -> Floats:
+        """Where it rests, (3,), m, in the world."""
+        return self.resting[:3]
+
+
+def measured_arm(
+    camera: CalibratedCamera, key_points: Sequence[BodyKeyPoints], *, distance: float | None = None,
+    height: float | None = None,
+) -> MeasuredArm:  # fmt: skip
+    """The measures of the right arm in these images, which begin with a resting arm.
+
+    Args:
+        camera: Calibrated, standing still.
+        key_points: Of images in which the arm rests and then moves to several sides.
+        distance: Of the right shoulder along the camera's axis, m.
+        height: Of the person, m; without, that of a mean adult, who is also what uncertain lengths tend to.
+
+    Raises InputError for too few images, and for lengths that no arm has.
+    """
+    arms = np.array([one.positions[0] for one in key_points]).reshape(-1, len(ARM_POINTS), 2)
+    whole = np.isfinite(arms).all(axis=(1, 2))
+    if whole.sum() < MIN_IMAGES:
+        raise InputError(
+            f"the right arm is in view in {whole.sum()} images, {MIN_IMAGES} are needed: sit where the camera sees "
+            "head, shoulders and the whole arm, and move it for some seconds"
+        )
+    seen = [one for one, good in zip(key_points, whole, strict=True) if good]
+    rays = _rays(camera, arms[whole])
+    usual = np.array([UPPER_ARM_OF_HEIGHT, FOREARM_OF_HEIGHT]) * (MEAN_HEIGHT_M if height is None else height)
+    if distance is not None:
+        deviation, along = DISTANCE_SD / distance, distance
+    else:
+        deviation = HEIGHT_SD if height is not None else ANY_HEIGHT_SD
+        along = _distance_of(camera, seen, rays, float(usual.sum()))
+    measured = _lengths(_points(camera, seen, rays, along))
+    usual_sd = usual * (ANY_HEIGHT_SD if height is None else HEIGHT_SD)
+    measured_sd = np.hypot(LENGTHS_SD, deviation * usual)
+    weights = np.array([usual_sd**-2, measured_sd**-2])
+    upper_arm, forearm = (weights * [usual, measured]).sum(axis=0) / weights.sum(axis=0)
+    lengths = {"upper_arm": float(upper_arm), "forearm": float(forearm), "hand": HAND_OF_FOREARM * float(forearm)}
+    for name, (least, most) in LIMITS_M.items():
+        if not least <= lengths[name] <= most:
+            raise InputError(
+                f"the {name.replace('_', ' ')} seems to be {100.0 * lengths[name]:.0f} cm long, {100.0 * least:.0f} "
+                f"to {100.0 * most:.0f} cm expected: is the distance right, and was the whole arm in view?"
+            )
+    resting = _resting(camera, _points(camera, seen, rays, along))
+    return MeasuredArm(
+        **lengths,
+        resting=resting,
+        length_deviation=float(weights.sum(axis=0).min() ** -0.5),
+        distance_deviation=deviation * along,
+    )
+
+
+def _rays(camera: CalibratedCamera, pixels: Floats) -> Floats:
+    """Points at a depth of 1 m, (N, 4, 3), in the camera's frame; the lens's distortion is left out."""
+    flat = np.concatenate([pixels, np.ones((*pixels.shape[:2], 1))], axis=2)
+    return np.asarray(flat @ np.linalg.inv(camera.matrix).T)
+
+
+def _points(camera: CalibratedCamera, seen: Sequence[BodyKeyPoints], rays: Floats, along: float) -> Floats:
+    """Right arms with the shoulder at that depth, (N, 4, 3), m, in the camera's frame."""
+    depths = np.array([one.depths_at(along, camera.matrix[0, 0])[0] for one in seen])
+    return np.asarray((along + depths)[..., None] * rays)
+
+
+def _lengths(points: Floats) -> Floats:
+    """Upper arm and forearm, m: medians, which four cameras confirm within 2 cm."""
+    return np.asarray(np.median(np.linalg.norm(np.diff(points[:, :3], axis=1), axis=2), axis=0))
+
+
+def _distance_of(camera: CalibratedCamera, seen: Sequence[BodyKeyPoints], rays: Floats, arm: float) -> float:
+    """The depth of the shoulder, m, at which upper arm and forearm together have that length."""
+    low, high = 0.3, 10.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        shorter = _lengths(_points(camera, seen, rays, middle)).sum() < arm
+        low, high = (middle, high) if shorter else (low, middle)
+    return low
+
+
+def _resting(camera: CalibratedCamera, points: Floats) -> Floats:
+    """Shoulder, elbow and fingertip of the first images, in the world, (9,)."""
+    first = np.median(points[:RESTING_IMAGES], axis=0)
+    in_world = (first - camera.camera_from_world[:3, 3]) @ camera.camera_from_world[:3, :3]
+    return np.concatenate([in_world[0], in_world[1], 2.0 * in_world[3] - in_world[2]])
