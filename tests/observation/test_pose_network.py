@@ -63,7 +63,7 @@ def test_of_two_persons_the_nearer_one_is_followed_and_the_other_noticed():
     assert not detector.others
     assert far.positions[0, 0, 0] < 400
     image[240:720, 640:] = person
-    for _ in range(60):
+    for _ in range(150):
         near = detector.detect(image)
     assert detector.others
     np.testing.assert_allclose(near.positions[0] - (640, 240), [SHOULDER, ELBOW, WRIST, HAND], rtol=0.0, atol=16.0)

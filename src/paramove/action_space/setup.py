@@ -62,7 +62,7 @@ def read_person(path: Path) -> Person:
     """The person of a YAML file. Raises InputError if it is missing or invalid."""
     example = "shoulder: [-0.27, -0.18, 0.35], upper_arm: 0.28, forearm: 0.24, hand: 0.17, all in m"
     try:
-        remedy = f"it holds a person's measures, such as {example}"
+        remedy = f"`paramove webcam person` writes it; it holds a person's measures, such as {example}"
         return Person.model_validate(read_document(path, "file of a person", remedy=remedy).data)
     except ValidationError as error:
         errors = "; ".join(f"{'.'.join(map(str, one['loc'])) or 'file'}: {one['msg']}" for one in error.errors())

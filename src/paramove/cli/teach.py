@@ -52,7 +52,7 @@ def webcam(
     set already, or one camera and no person; 130 Ctrl-C: movements that have ended are in the set.
     """
     from paramove.action_space import read_person
-    from paramove.cameras import Board, read_cameras
+    from paramove.cameras import Board, measured_cameras
     from paramove.cli.calibrate import length
     from paramove.cli.webcam import seen_by
     from paramove.demonstrations import DemonstrationError, TaughtSet
@@ -62,7 +62,7 @@ def webcam(
     if targets != "board":
         raise _ended(f"--targets {targets!r}: 'board' expected", exit_codes.USAGE)
     try:
-        calibrated = read_cameras(cameras)
+        calibrated = measured_cameras(Path(), cameras)
         taught = TaughtSet(folder, action, subject, "shown to cameras; theta is the touched position", append=append)
         places = board_targets(Board(length(square, "--square")).corners())
         who = None if person is None else read_person(person)

@@ -72,13 +72,13 @@ def person(
     Exit codes: 0 written; 1 the images ended before; 66 no calibration, pose network or camera; 77 not allowed to
     write; 78 a length without unit, or images of no use.
     """
-    from paramove.cameras import read_cameras
+    from paramove.cameras import measured_cameras
     from paramove.cli.calibrate import length
     from paramove.documents import InputError
     from paramove.observation import PersonSetUp
 
     try:
-        camera = read_cameras(cameras)[0]
+        camera = measured_cameras(Path(), cameras)[0]
         far = None if distance is None else length(distance, "--distance")
         tall = None if height is None else length(height, "--height")
         images = None if source.startswith("recording:") else _images(camera, source)

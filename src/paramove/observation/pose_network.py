@@ -45,7 +45,7 @@ WINDOWS = (
 )
 """Where else a person is searched: side of a square, of the picture's longer one, and place in the picture, 0 to 1."""
 WATCHED_EVERY = 5
-"""One of them is searched for another person every so many images."""
+"""In every so many images one of them is searched for another person."""
 TURNS = np.radians([0.0, 90.0, 180.0, 270.0])
 VOTES = 8
 """Images of a person that decide how the picture is turned: a turned person is often found as well, with less certain
@@ -111,6 +111,8 @@ class PoseNetwork:
         self._images = 0
         self._window = 0
         self._other_window: int | None = None
+        self._candidate: Crop | None = None
+        self._passes = 0
         self._votes, self._voted = np.zeros(len(TURNS)), 0
 
     @property
@@ -154,8 +156,13 @@ class PoseNetwork:
         return crops[self._votes.argmax()]
 
     def _watch(self, image: Image, followed: Crop) -> None:
-        """Searches another person in one part of an image."""
-        other = self._converged(image, self._next_window(image))
+        """Searches another person in one part of an image; one pass an image, so that none takes long."""
+        crop = self._candidate or self._next_window(image)
+        _, self._candidate = self._body(image, crop)
+        self._passes = 0 if self._candidate is None else self._passes + 1
+        if 0 < self._passes < FIRST_PASSES:
+            return
+        other, self._candidate, self._passes = self._candidate, None, 0
         apart = 0.0 if other is None else float(np.hypot(*(other.centre - followed.centre)))
         if other is not None and apart > 0.5 * min(other.side_px, followed.side_px) / BODY_SIDE:
             self._other_window = self._window
