@@ -1,11 +1,19 @@
 """One simulated person, and what is measured of the model."""
 
+from pathlib import Path
+
 import numpy as np
 
-from studies.teaching.experiment import along, cameras, run
+from paramove.demonstrations import DemonstrationSet
+from paramove.motion.reaching_file import load_reaching_model
+from paramove.motion.servo_arm_reaching import ServoArmReaching
+from paramove.robots import RobotDescription
+from paramove.training import examples_of, train_and_write, untrained
+from studies.teaching.experiment import ACTION, along, cameras, run, taught
 from studies.teaching.simulated_person import RATE_HZ, key_points, mean_path, performance
 
 TARGET = np.array([0.2, 0.0, 0.0])
+ROBOT = Path(__file__).parents[3] / "robot_description" / "koch_v1_1"
 
 
 def test_two_cameras_reach_new_positions():
@@ -13,6 +21,17 @@ def test_two_cameras_reach_new_positions():
     assert found["movements"] >= 8
     assert found["end"] < 2.0
     assert found["path"] < 6.0
+
+
+def test_a_robot_executes_what_two_cameras_saw(tmp_path):
+    folder, target = tmp_path / "set", np.array([0.18, 0.05, 0.08])
+    taught(folder, 2, 0)
+    examples = examples_of(DemonstrationSet.load(folder), action=ACTION, body=True)
+    description, floor = examples.description(ACTION), examples.floor_deviation
+    make = {ACTION: lambda: untrained("best", description=description, floor_deviation=floor)}
+    train_and_write(examples, make, tmp_path / "body.npz")
+    motion = ServoArmReaching(RobotDescription.load(ROBOT), load_reaching_model(tmp_path / "body.npz")).reach(target)
+    np.testing.assert_allclose(motion.gripper[-1], target, rtol=0.0, atol=1e-3)
 
 
 def test_a_path_is_compared_by_where_it_leads():
