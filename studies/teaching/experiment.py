@@ -16,7 +16,7 @@ from paramove.documents import Floats
 from paramove.observation import BodyKeyPoints, WebcamTeacher, board_targets
 from paramove.phmm import ParametricHMM
 from paramove.training import examples_of, train_and_write, untrained
-from studies.teaching.simulated_person import RATE_HZ, SIZES, key_points, mean_path, performance
+from studies.teaching.simulated_person import RATE_HZ, SIZES, key_points, mean_path, movement
 
 SQUARE_M = 0.03
 PLACES = ((0.6, -1.8, 0.8), (1.7, -0.9, 0.75))
@@ -47,7 +47,7 @@ def camera_at(name: str, place: Floats) -> CalibratedCamera:
 
 
 def taught(folder: Path, count: int, seed: int) -> list[str]:
-    """A set taught in front of so many cameras; what the person was told."""
+    """A set taught in front of so many cameras; what the person was prompted."""
     rng, views = np.random.default_rng(seed), cameras(count)
     targets = board_targets(Board(SQUARE_M).corners())
     known: dict[str, Any] = {}
@@ -60,7 +60,7 @@ def taught(folder: Path, count: int, seed: int) -> list[str]:
     teacher = WebcamTeacher(views, targets, written, rate_hz=RATE_HZ, **known)
     said, frame = [], 0
     for target in targets.values():
-        poses = performance(target, rng)
+        poses = movement(target, rng)
         tracks = [key_points(poses, camera, rng) for camera in views]
         for now in range(len(poses)):
             frame += 1
@@ -73,7 +73,7 @@ def _shown(
     at_ns: int,
 ) -> list[str]:  # fmt: skip
     pairs = list(zip(views, tracks, strict=True))
-    return [teacher.see(camera.name, at_ns, track[now]) for camera, track in reversed(pairs)]
+    return [teacher.see(camera.name, at_ns, track[now]) for camera, track in pairs]
 
 
 def trained(folder: Path) -> ParametricHMM:

@@ -28,7 +28,7 @@ STILL = Variation(**dict.fromkeys((field.name for field in fields(Variation)), 0
 """Of the mean movement."""
 
 
-def performance(target: ArrayLike, rng: np.random.Generator) -> Floats:
+def movement(target: ArrayLike, rng: np.random.Generator) -> Floats:
     """Poses (T, 9) at `RATE_HZ`: a rest, to the target, held there, back, a rest."""
     pose = arm_poses(Demonstrator().demonstrate("pointing", np.asarray(target, dtype=np.float64), rng))
     return _with_rests(pose, np.asarray(target, dtype=np.float64))
@@ -88,7 +88,7 @@ def key_points(
 
 def _correlated(rng: np.random.Generator, shape: Sequence[int]) -> Floats:
     """Unit noise along the first axis, correlated over `CORRELATED_S`."""
-    kept, white = float(np.exp(-1.0 / (RATE_HZ * CORRELATED_S))), rng.standard_normal(shape)
+    remaining, white = float(np.exp(-1.0 / (RATE_HZ * CORRELATED_S))), rng.standard_normal(shape)
     for frame in range(1, len(white)):
-        white[frame] = kept * white[frame - 1] + np.sqrt(1.0 - kept**2) * white[frame]
+        white[frame] = remaining * white[frame - 1] + np.sqrt(1.0 - remaining**2) * white[frame]
     return white

@@ -13,7 +13,7 @@ from paramove.demonstrations import DemonstrationSet
 from paramove.observation import board_targets, key_points_message
 from paramove.recording import RecordingWriter
 from studies.teaching.experiment import cameras
-from studies.teaching.simulated_person import RATE_HZ, key_points, performance
+from studies.teaching.simulated_person import RATE_HZ, key_points, movement
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def recording(tmp_path_factory):
     rng, frame = np.random.default_rng(4), itertools.count(1)
     with RecordingWriter(folder / "recording.mcap", "a test") as writer:
         for target in list(board_targets(Board(0.03).corners()).values())[:2]:
-            poses = performance(target, rng)
+            poses = movement(target, rng)
             tracks = [key_points(poses, camera, rng) for camera in cameras(2)]
             for row in zip(*tracks, strict=True):
                 at_ns = round(next(frame) * 1e9 / RATE_HZ)

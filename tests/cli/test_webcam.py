@@ -12,7 +12,7 @@ from paramove.demonstrations import RESTING_SHOULDER
 from paramove.observation import key_points_message
 from paramove.recording import RecordingWriter
 from studies.teaching.experiment import cameras
-from studies.teaching.simulated_person import RATE_HZ, key_points, performance
+from studies.teaching.simulated_person import RATE_HZ, key_points, movement
 
 
 def test_a_file_that_is_not_the_package_ends_with_66(tmp_path):
@@ -27,7 +27,7 @@ def recording(tmp_path_factory):
     """A person who rests and moves the arm before one camera."""
     folder, rng = tmp_path_factory.mktemp("recording"), np.random.default_rng(2)
     write_cameras(folder / "cameras.yaml", cameras(1))
-    poses = np.concatenate([performance(target, rng) for target in ([0.2, 0.2, 0.0], [0.2, -0.5, 0.1])])
+    poses = np.concatenate([movement(target, rng) for target in ([0.2, 0.2, 0.0], [0.2, -0.5, 0.1])])
     with RecordingWriter(folder / "recording.mcap", "a test") as writer:
         for number, points in enumerate(key_points(poses, cameras(1)[0], rng), start=1):
             at_ns = round(number * 1e9 / RATE_HZ)

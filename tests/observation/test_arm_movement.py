@@ -7,7 +7,7 @@ from paramove.demonstrations import RESTING_SHOULDER
 from paramove.documents import InputError
 from paramove.observation import ArmSizes, reconstructed
 from studies.teaching.experiment import cameras
-from studies.teaching.simulated_person import RATE_HZ, SIZES, key_points, performance
+from studies.teaching.simulated_person import RATE_HZ, SIZES, key_points, movement
 
 TARGET = np.array([0.2, 0.05, 0.0])
 
@@ -15,7 +15,7 @@ TARGET = np.array([0.2, 0.05, 0.0])
 @pytest.fixture(scope="module")
 def poses():
     """A rest, a movement to the target, and the touch."""
-    whole = performance(TARGET, np.random.default_rng(1))
+    whole = movement(TARGET, np.random.default_rng(1))
     arrived = int(np.linalg.norm(whole[:, 6:9] - TARGET, axis=1).argmin())
     return whole[: arrived + 10]
 

@@ -7,7 +7,7 @@ from paramove.demonstrations import RESTING_SHOULDER
 from paramove.documents import InputError
 from paramove.observation import BodyKeyPoints, KeyPointOptions, PersonSetUp, measured_arm
 from studies.teaching.experiment import cameras
-from studies.teaching.simulated_person import SIZES, key_points, performance
+from studies.teaching.simulated_person import SIZES, key_points, movement
 
 CAMERA = cameras(1)[0]
 EXACT = KeyPointOptions(outlier=1e-9, exchanged=1e-9, other=1e-9, elbow_depth=1e-6, hand_depth=1e-6)
@@ -18,7 +18,7 @@ DISTANCE = float(CAMERA.camera_from_world[2, :3] @ RESTING_SHOULDER + CAMERA.cam
 def poses():
     """A rest, and movements to three sides."""
     rng = np.random.default_rng(2)
-    return np.concatenate([performance(target, rng) for target in ([0.2, 0.2, 0.0], [0.2, -0.5, 0.1], [0.3, 0.0, 0.4])])
+    return np.concatenate([movement(target, rng) for target in ([0.2, 0.2, 0.0], [0.2, -0.5, 0.1], [0.3, 0.0, 0.4])])
 
 
 def seen(poses, seed=0, options=EXACT):
@@ -61,7 +61,10 @@ def test_too_few_images_and_impossible_lengths_are_errors(poses):
     with pytest.raises(InputError, match="15 images"):
         measured_arm(CAMERA, [*seen(poses)[:15], BodyKeyPoints.nobody()], distance=DISTANCE)
     with pytest.raises(InputError, match="is the distance right"):
-        measured_arm(CAMERA, seen(poses), distance=4.0 * DISTANCE, height=6.8)
+        measured_arm(CAMERA, seen(poses), distance=4.0 * DISTANCE)
+    for wrong in ({"distance": 0.0}, {"height": 0.0}, {"height": 175.0}):
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            PersonSetUp(CAMERA, **wrong)
 
 
 def test_a_person_follows_the_prompts(poses):
@@ -71,7 +74,7 @@ def test_a_person_follows_the_prompts(poses):
         said.append(set_up.see(points))
         if set_up.arm is not None:
             break
-    assert "the resting arm is seen" in said
+    assert "the resting arm is detected" in said
     assert set_up.arm is not None
     np.testing.assert_allclose(set_up.arm.shoulder, RESTING_SHOULDER, rtol=0.0, atol=0.08)
 

@@ -19,7 +19,7 @@ from paramove.cameras import CalibratedCamera, read_cameras
 from paramove.demonstrations import RESTING_SHOULDER, table_place
 from paramove.observation import ArmObserver, ArmSizes, key_points_message
 from paramove.recording import RecordingWriter, read
-from studies.teaching.simulated_person import RATE_HZ, key_points, performance
+from studies.teaching.simulated_person import RATE_HZ, key_points, movement
 from tests.action_space.performances import performed
 from tests.cameras.board_scene import Sheet, held, looking
 
@@ -51,7 +51,7 @@ def board_video(path):
 def moving_arm(path):
     """Key points of a person whose arm hangs and then moves."""
     rng = np.random.default_rng(2)
-    poses = np.concatenate([performance(target, rng) for target in ([0.2, 0.2, 0.0], [0.2, -0.5, 0.1])])
+    poses = np.concatenate([movement(target, rng) for target in ([0.2, 0.2, 0.0], [0.2, -0.5, 0.1])])
     with RecordingWriter(path, "a rehearsal") as writer:
         for number, points in enumerate(key_points(poses, CAMERA, rng), start=1):
             at_ns = round(number * 1e9 / RATE_HZ)

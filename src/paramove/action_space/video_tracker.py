@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paramove.action_space.awaited_key_points import AwaitedKeyPoints, Item
+from paramove.action_space.awaited_key_points import Awaited, AwaitedKeyPoints, Timed
 from paramove.action_space.tracker import ActionTracker, TrackEstimate
 from paramove.cameras import AlignedViews, CalibratedCamera, CameraWatch, Views
 from paramove.documents import Floats, Image
@@ -93,8 +93,8 @@ class VideoTracker:
         self._observer = observer
         self._key_points = KeyPointObserver(observer.sizes, cameras) if key_points is None else key_points
         self._cameras = {camera.name: camera for camera in cameras}
-        self._awaited = {name: AwaitedKeyPoints() for name in self._cameras}
-        self._views = AlignedViews[Item](list(self._cameras), period_s)
+        self._awaited = AwaitedKeyPoints(list(self._cameras))
+        self._views = AlignedViews[Timed](list(self._cameras), period_s)
         self._started_ns: int | None = None
         self._watch = CameraWatch(cameras, period_s)
         self._dark: list[str] = []
@@ -124,16 +124,16 @@ class VideoTracker:
         The background is learned when the next state is requested: an estimate does not wait for that.
         """
         if self._watch.accepts(camera, captured_ns, image):
-            yield from self._with_key_points(camera, self._awaited[camera].add_image(captured_ns, image))
+            for views in self._views.add(camera, captured_ns, (captured_ns, image)):
+                yield from self._all_tracked(self._awaited.add_set(views))
 
     def see_key_points(self, camera: str, captured_ns: int, points: BodyKeyPoints) -> Iterator[TrackedState]:
         """The states that the key points of an image complete."""
-        yield from self._with_key_points(camera, self._awaited[camera].add_points(captured_ns, points))
+        yield from self._all_tracked(self._awaited.add_points(camera, captured_ns, points))
 
-    def _with_key_points(self, camera: str, released: Iterator[tuple[int, Item]]) -> Iterator[TrackedState]:
-        for captured_ns, item in released:
-            for views in self._views.add(camera, captured_ns, item):
-                yield from self._tracked(views)
+    def _all_tracked(self, released: Iterator[Awaited]) -> Iterator[TrackedState]:
+        for views, points in released:
+            yield from self._tracked(views, points)
 
     def add_unreadable(self, camera: str, captured_ns: int, why: str) -> None:
         """Reports an image that could not be decoded."""
@@ -142,24 +142,31 @@ class VideoTracker:
     def tick(self, now_ns: int) -> Iterator[TrackedState]:
         """Advances the time, with images or without; the states of images that wait no longer for key points."""
         self._watch.tick(now_ns)
-        for camera, awaited in self._awaited.items():
-            yield from self._with_key_points(camera, awaited.released(now_ns))
+        yield from self._all_tracked(self._awaited.released(now_ns))
 
     def trouble(self) -> str:
         """Why images are not used, and what is uncertain about the arm; "" if nothing is wrong."""
-        return "; ".join(part for part in (*self._watch.troubles(), *self._dark, self._uncertainty) if part)
+        return "; ".join(
+            part for part in (*self._watch.troubles(), self._awaited.trouble(), *self._dark, self._uncertainty) if part
+        )
 
     @property
     def problem_kind(self) -> tuple[str, ...]:
         """Changes with the causes of `trouble`, not with the numbers in it."""
         estimate = self._tracker.estimate
         lost = estimate is not None and estimate.lost
-        return (*self._watch.troubles(), *self._dark, *(("lost" if lost else "unsure",) if self._uncertainty else ()))
+        late = ("late",) if self._awaited.trouble() else ()
+        return (
+            *self._watch.kinds(),
+            *late,
+            *self._dark,
+            *(("lost" if lost else "unsure",) if self._uncertainty else ()),
+        )
 
-    def _tracked(self, views: Views[Item]) -> Iterator[TrackedState]:
+    def _tracked(self, views: Views[Timed], points: Sequence[BodyKeyPoints | None]) -> Iterator[TrackedState]:
         self._started_ns = views.captured_ns if self._started_ns is None else self._started_ns
-        self._dark = self._look([None if item is None else item[0] for item in views.images])
-        self._key_points.look([None if item is None else item[1] for item in views.images])
+        self._dark = self._look([None if timed is None else timed[1] for timed in views.images])
+        self._key_points.look(points)
         time_s = (views.captured_ns - self._started_ns) * 1e-9
         elapsed_s = _since_last(self._tracker, time_s)
         estimate = self._tracker.update(time_s, self._log_likelihoods, self._observer.presence)
@@ -186,7 +193,7 @@ class VideoTracker:
         _learn(self._tracker, self._observer, estimate, elapsed_s)
 
     def _log_likelihoods(self, poses: Floats) -> Floats:
-        """ln P of images and key points; what both are evidence of is counted in each."""
+        """ln P of images and key points, taken as independent."""
         result = self._observer.log_likelihoods(poses)
         return result + self._key_points.log_likelihoods(poses) if any(self._key_points.has_points) else result
 

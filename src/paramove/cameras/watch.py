@@ -61,14 +61,23 @@ class CameraWatch:
 
     def troubles(self) -> list[str]:
         """All faults, one message each."""
+        return [message for _, message in self._faults()]
+
+    def kinds(self) -> list[str]:
+        """The same without numbers that change all the time."""
+        return [kind for kind, _ in self._faults()]
+
+    def _faults(self) -> list[tuple[str, str]]:
         no_data = [
             name for name, received_ns in self._received_ns.items() if self._now_ns - received_ns > NO_DATA_S * 1e9
         ]
-        rejected = [one for name, one in self._rejected.items() if name not in no_data]
         if len(no_data) == len(self._calibrated):
-            return [f"no images from any camera ({', '.join(no_data)})"]
-        slow = [self._slow(name) for name in self._calibrated if name not in no_data]
-        return [*(f"no images from {name}" for name in no_data), *rejected, *(one for one in slow if one)]
+            message = f"no images from any camera ({', '.join(no_data)})"
+            return [(message, message)]
+        messages = [f"no images from {name}" for name in no_data]
+        messages += [one for name, one in self._rejected.items() if name not in no_data]
+        slow = [(name, self._slow(name)) for name in self._calibrated if name not in no_data]
+        return [*((one, one) for one in messages), *((f"{name} is slow", one) for name, one in slow if one)]
 
     def _slow(self, camera: str) -> str:
         times = self._times_ns[camera]

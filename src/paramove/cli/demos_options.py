@@ -11,8 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from paramove.demonstrations import DemonstrationError
-from paramove.documents import exit_codes, printable
+from paramove.documents import InputError, exit_codes, printable
 from paramove.recording import RecordingExistsError
 
 SetArgument = Annotated[Path, typer.Argument(metavar="SET", help="folder of a demonstration set")]
@@ -35,7 +34,7 @@ def one_line() -> Iterator[None]:
     """Ends the command with what is wrong on standard error, and an exit code, instead of a traceback."""
     try:
         yield
-    except DemonstrationError as error:
+    except InputError as error:
         raise ended(str(error), error.exit_code) from error
     except RecordingExistsError as error:
         raise ended(str(error), exit_codes.USAGE) from error

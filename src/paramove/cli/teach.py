@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from paramove.cli.demos_options import ended, one_line
 from paramove.documents import exit_codes, printable
 
 if TYPE_CHECKING:
@@ -46,34 +48,31 @@ def webcam(
     """Record demonstrations: your arm hangs, then you touch a corner of the board and hold it there; nine times.
 
     The board lies on the table where the cameras were calibrated with it. A movement begins and ends by itself, is
-    written at once, and a bad one is asked for again. Theta is the touched position, frame of the table.
+    written at once; after a bad one the prompt is repeated. Theta is the touched position, frame of the table.
 
-    Exit codes: 0 all corners were touched; 1 some were not; 66 no calibration, pose network or camera; 78 there is a
-    set already, or one camera and no person; 130 Ctrl-C: movements that have ended are in the set.
+    Exit codes: 0 all corners were touched; 1 some were not; 66 no calibration, pose network or camera; 77 the set
+    cannot be written; 78 there is a set already, or one camera and no person; 130 Ctrl-C: what has ended is in the set.
     """
     from paramove.action_space import read_person
     from paramove.cameras import Board, measured_cameras
     from paramove.cli.calibrate import length
     from paramove.cli.webcam import seen_by
-    from paramove.demonstrations import DemonstrationError, TaughtSet
-    from paramove.documents import InputError
+    from paramove.demonstrations import TaughtSet
     from paramove.observation import WebcamTeacher, board_targets
 
     if targets != "board":
-        raise _ended(f"--targets {targets!r}: 'board' expected", exit_codes.USAGE)
-    try:
+        raise ended(f"--targets {targets!r}: 'board' expected", exit_codes.USAGE)
+    with one_line():
         calibrated = measured_cameras(Path(), cameras)
         taught = TaughtSet(folder, action, subject, "shown to cameras; theta is the touched position", append=append)
         places = board_targets(Board(length(square, "--square")).corners())
         who = None if person is None else read_person(person)
         sizes, shoulder = (None, None) if who is None else (who.sizes, who.shoulder)
         teacher = WebcamTeacher(calibrated, places, taught, sizes=sizes, shoulder=shoulder)
-        _lead(teacher, seen_by(calibrated, source))
-    except (InputError, DemonstrationError) as error:
-        missing = isinstance(error, InputError) and error.missing
-        raise _ended(str(error), exit_codes.INPUT_MISSING if missing else exit_codes.CONFIGURATION) from error
-    except KeyboardInterrupt:
-        raise _ended(f"{folder}: {len(taught.written)} movements", exit_codes.by_signal(2)) from None
+        try:
+            _lead(teacher, seen_by(calibrated, source))
+        except KeyboardInterrupt:
+            raise ended(f"{folder}: {len(taught.written)} movements", exit_codes.by_signal(signal.SIGINT)) from None
     typer.echo(f"{folder}: {len(taught.written)} new; train a model with `paramove train {folder}`")
     if not teacher.finished:
         raise typer.Exit(exit_codes.FAILURE)
@@ -89,8 +88,3 @@ def _lead(teacher: WebcamTeacher, seen: Iterator[tuple[str, int, BodyKeyPoints]]
             typer.echo(teacher.prompt)
         if teacher.finished:
             return
-
-
-def _ended(message: str, code: int) -> typer.Exit:
-    typer.echo(printable(message), err=True)
-    return typer.Exit(code)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from paramove.cli.demos_options import ended
 from paramove.documents import exit_codes, printable
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def setup(
         folder = fetch_networks(wheel)
         stored_network(folder)
     except InputError as error:
-        raise _ended(str(error), exit_codes.INPUT_MISSING) from error
+        raise ended(str(error), exit_codes.INPUT_MISSING) from error
     typer.echo(f"the pose network is in {folder}")
 
 
@@ -70,23 +71,27 @@ def person(
     the height of a mean adult.
 
     Exit codes: 0 written; 1 the images ended before; 66 no calibration, pose network or camera; 77 not allowed to
-    write; 78 a length without unit, or images of no use.
+    write; 78 a wrong length, a damaged network, or images of no use.
     """
     from paramove.cameras import measured_cameras
     from paramove.cli.calibrate import length
     from paramove.documents import InputError
-    from paramove.observation import PersonSetUp
+    from paramove.observation import PersonSetUp, stored_network
 
     try:
         camera = measured_cameras(Path(), cameras)[0]
         far = None if distance is None else length(distance, "--distance")
         tall = None if height is None else length(height, "--height")
         images = None if source.startswith("recording:") else _images(camera, source)
+        if images is not None:
+            stored_network()
         if square is not None:
             far = _at_chest(camera, images, length(square, "--square"))
         set_up = PersonSetUp(camera, distance=far, height=tall)
         typer.echo(set_up.prompt)
-        for _, _, points in seen_by([camera], [source], images):
+        for name, _, points in seen_by([camera], [source], images):
+            if name != camera.name:
+                continue
             happened = set_up.see(points)
             if happened:
                 typer.echo(printable(happened))
@@ -94,13 +99,12 @@ def person(
             if set_up.arm is not None:
                 break
         if set_up.arm is None:
-            raise _ended("the images ended before the person was measured", exit_codes.FAILURE)
+            raise ended("the images ended before the person was measured", exit_codes.FAILURE)
         _write(out, set_up.arm)
     except InputError as error:
-        code = exit_codes.INPUT_MISSING if error.missing else exit_codes.CONFIGURATION
-        raise _ended(str(error), code) from error
+        raise ended(str(error), error.exit_code) from error
     except OSError as error:
-        raise _ended(f"{error.filename or out}: {error.strerror}", exit_codes.PERMISSION) from error
+        raise ended(f"{error.filename or out}: {error.strerror}", exit_codes.PERMISSION) from error
     typer.echo(f"{out}: written; the shoulder is in the frame of the table")
 
 
@@ -130,7 +134,7 @@ def _at_chest(
         if len(depths) == BOARD_LOOKS:
             break
     if len(depths) < BOARD_LOOKS:
-        raise InputError("the images ended before the board was seen at the chest")
+        raise InputError("the images ended before the board was detected at the chest")
     far = float(np.median(depths)) + CHEST_M
     typer.echo(f"your shoulder is {far:.2f} m from the camera; put the board away")
     return far
@@ -161,8 +165,3 @@ def seen_by(
         raise InputError(f"{len(cameras)} cameras are calibrated, {len(sources)} sources given: one --source for each")
     images = images_of(cameras, sources) if images is None else images
     return detected_key_points(images, lambda trouble: typer.echo(printable(trouble or "all is well again")))
-
-
-def _ended(message: str, code: int) -> typer.Exit:
-    typer.echo(printable(message), err=True)
-    return typer.Exit(code)

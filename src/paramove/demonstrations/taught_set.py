@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import itertools
+import os
 from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
 from paramove.demonstrations.labelling import next_repetition
 from paramove.demonstrations.labels import FILE_NAME, Segment, load_labels
 from paramove.demonstrations.movement import DemonstrationError
 from paramove.demonstrations.writing import Label, Take, write_set
-from paramove.documents import Floats, replacing
+from paramove.documents import Floats, findings, replacing
 
 PARAMETERS = ("target_x", "target_y", "target_z")
 RECORDING = "taught_{:03d}.mcap"
@@ -30,7 +33,8 @@ class TaughtSet:
     Attributes:
         written: Recordings of this session, the latest last.
 
-    Raises DemonstrationError if there is a set and `append` is not given, or if it has other parameters.
+    Raises DemonstrationError if there is a set and `append` is not given, if it has other parameters, or for a name
+    that no action has; OSError if the folder cannot be written.
     """
 
     def __init__(self, folder: Path, action: str, subject: str, description: str, *, append: bool = False) -> None:
@@ -38,6 +42,8 @@ class TaughtSet:
         self._labels = folder / FILE_NAME
         self._before: list[bytes | None] = []
         self.written: list[str] = []
+        self._segment((0.0, 0.0, 0.0))
+        self._check_can_be_written()
         if self._labels.exists():
             self._check_existing(append)
 
@@ -96,12 +102,26 @@ class TaughtSet:
         (self._folder / name).unlink()
         return name
 
+    def _check_can_be_written(self) -> None:
+        place = next(path for path in (self._folder.absolute(), *self._folder.absolute().parents) if path.exists())
+        number = 0 if place.is_dir() else errno.ENOTDIR
+        if number or not os.access(place, os.W_OK | os.X_OK):
+            number = number or errno.EACCES
+            raise OSError(number, os.strerror(number), str(place))
+
+    def _segment(self, theta: tuple[float, ...]) -> Segment:
+        try:
+            return Segment(
+                recording="any", start=0.0, end=1.0, action=self._action, theta=list(theta), subject=self._subject
+            )
+        except ValidationError as error:
+            raise DemonstrationError(
+                f"action {self._action!r}, subject {self._subject!r}: {findings(error)}"
+            ) from error
+
     def _repetition(self, theta: tuple[float, ...]) -> int:
         there = load_labels(self._labels).file.segments if self._labels.exists() else []
-        like = Segment(
-            recording="any", start=0.0, end=1.0, action=self._action, theta=list(theta), subject=self._subject
-        )
-        return next_repetition(there, like)
+        return next_repetition(there, self._segment(theta))
 
     def _free_name(self) -> str:
         names = (RECORDING.format(number) for number in itertools.count(1))

@@ -19,7 +19,7 @@ from paramove.cameras import CalibratedCamera, StereoRig
 from paramove.documents import Floats, InputError, Ints
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.body_key_points import ARM_POINTS, SIDES, BodyKeyPoints
-from paramove.observation.key_point_observer import KeyPointObserver, KeyPointOptions
+from paramove.observation.key_point_observer import MIN_INLIER, KeyPointObserver, KeyPointOptions
 
 POINTS, DIMENSIONS = len(ARM_POINTS), 3 * len(ARM_POINTS)
 SHOULDER, ELBOW, WRIST, HAND = range(POINTS)
@@ -118,11 +118,11 @@ def _see(
     if side >= len(SIDES):
         return side
     own, total = comparing.densities(arm[None], camera, seen, side, model)
-    weights = np.where(np.isfinite(seen.positions[side, :, 0]), np.exp(own - total)[0], 0.0)
+    weights = np.exp(own - total)[0]
     turn = camera.camera_from_world[:3, :3]
     local = arm @ turn.T + camera.camera_from_world[:3, 3]
     scale = np.diag(camera.matrix)[:2]
-    for point in np.flatnonzero(weights > 1e-3):
+    for point in np.flatnonzero(weights > MIN_INLIER):
         x, y, z = local[point]
         if z <= 0.0:
             continue
@@ -213,6 +213,8 @@ def _first_guess(
         assert shoulder is not None
         points = np.stack([_along_rays(cameras[0], one, shoulder) for one in key_points[0]])
     points = _without_jumps(points)
+    if shoulder is None and not np.isfinite(points[:, SHOULDER]).any():
+        raise InputError("no image in which two cameras detect the shoulder: are all of them on, and is it in view?")
     lying = sizes.upper_arm * np.arange(POINTS)[:, None] * np.array([0.0, 0.0, -0.5])
     default = lying + (np.nanmedian(points[:, SHOULDER], axis=0) if shoulder is None else shoulder)
     frames = np.arange(count)

@@ -26,7 +26,7 @@ class BodyKeyPoints:
         positions: (2, 4, 2), px; NaN where a point is unknown.
         deviations: Along each axis, (2, 4), px.
         depths: How much farther from the camera than the shoulder of that arm, (2, 4), m of the size that the network
-            believes the person has.
+            estimates the person to have.
         certainties: That a point is visible, (2, 4), 0 to 1.
         certainty: That there is a person, 0 to 1.
         px_per_m: How large the person of that size is in the image, px/m; 0 if unknown.
@@ -79,7 +79,7 @@ def key_points_message(points: BodyKeyPoints, captured_ns: int) -> BodyKeyPoints
 
 
 def key_points_from(message: BodyKeyPointsMessage) -> BodyKeyPoints:
-    """Of a message; points that are unusable or that nobody here knows are left out."""
+    """The points of a message; unusable ones and those of other names are left out."""
     points = BodyKeyPoints.nobody(message.certainty)
     deviations, depths = points.deviations.copy(), points.depths.copy()
     for one in message.points:

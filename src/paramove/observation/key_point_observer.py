@@ -11,13 +11,15 @@ from numpy.typing import ArrayLike
 from paramove.cameras import CalibratedCamera
 from paramove.documents import Floats, InputError
 from paramove.observation.arm_body import ArmSizes, fitted_poses
-from paramove.observation.body_key_points import SIDES, BodyKeyPoints
+from paramove.observation.body_key_points import ARM_POINTS, SIDES, BodyKeyPoints
 
 BODY_PER_DEVIATION = 35.0
-"""Side of a square as large as a person, in deviations of a key point: a point that is none of the arm lies anywhere
-in it."""
+"""Side of a square as large as a person, in deviations of a key point: a point elsewhere on the body lies anywhere in
+it."""
 ELSEWHERE = -2.0 * np.log(BODY_PER_DEVIATION)
 """ln of the density of such a point, per squared deviation."""
+MIN_INLIER = 1e-3
+"""A point that is less probably of the arm does not count."""
 STEP_M = 1e-4
 """Of the slopes by which a projected point follows the posture."""
 
@@ -135,7 +137,7 @@ class KeyPointObserver:
             bent_px = self._model_px(arm, camera, 0.0)[0]
             own, total = self.densities(arm, camera, points, hypothesis, self.options.across)
             inlier = np.exp(own - total)[0]
-            for point in np.flatnonzero(np.isfinite(points.positions[hypothesis, :, 0])):
+            for point in np.flatnonzero(inlier > MIN_INLIER):
                 weight = inlier[point] / (points.deviations[hypothesis, point] ** 2 + bent_px[point] ** 2)
                 precision += weight * slopes[point].T @ slopes[point]
                 towards += weight * slopes[point].T @ (points.positions[hypothesis, point] - projected[point])
@@ -155,27 +157,27 @@ class KeyPointObserver:
     def hypotheses(self, arm: Floats, camera: CalibratedCamera, points: BodyKeyPoints, model: float) -> Floats:
         """ln p of the points of the right arm being its own, those of the left one, or none of the arm; (3, M)."""
         sides = [self.densities(arm, camera, points, side, model)[1].sum(axis=1) for side in range(len(SIDES))]
-        nothing = ELSEWHERE * np.isfinite(points.positions[0, :, 0]).sum()
-        return np.stack([*sides, np.full(len(arm), nothing)]) + self.options.weights[:, None]
+        nothing = np.full(len(arm), len(ARM_POINTS) * ELSEWHERE)
+        return np.stack([*sides, nothing]) + self.options.weights[:, None]
 
     def densities(
         self, arm: Floats, camera: CalibratedCamera, points: BodyKeyPoints, side: int, model: float
     ) -> tuple[Floats, Floats]:
         """ln of the density of each point of one side, as a point of the arm and as any; (M, 4), of squared deviations.
 
-        An unknown point has the density 1.
+        An unknown point is no point of the arm.
         """
         ahead = arm @ camera.camera_from_world[2, :3] + camera.camera_from_world[2, 3]
         with np.errstate(invalid="ignore", divide="ignore"):
-            spread = 1.0 + (self._model_px(arm, camera, model) / points.deviations[side]) ** 2
+            widened = 1.0 + (self._model_px(arm, camera, model) / points.deviations[side]) ** 2
             squared = ((camera.project(arm) - points.positions[side]) ** 2).sum(axis=2) / points.deviations[side] ** 2
             depths = points.depths_at(ahead[:, 0], camera.matrix[0, 0])[:, side]
             behind = (ahead - ahead[:, :1] - depths) / self.options.depths
-            own = -0.5 * squared / spread - np.log(2.0 * np.pi * spread) - 0.5 * np.nan_to_num(behind) ** 2
+            own = -0.5 * squared / widened - np.log(2.0 * np.pi * widened) - 0.5 * np.nan_to_num(behind) ** 2
         own = np.where(np.isfinite(own) & (ahead > 0.0), own, -np.inf) + np.log1p(-self.options.outlier)
         total = np.logaddexp(own, np.log(self.options.outlier) + ELSEWHERE)
         known = np.isfinite(points.positions[side, :, 0])
-        return np.where(known, own, 0.0), np.where(known, total, 0.0)
+        return np.where(known, own, -np.inf), np.where(known, total, ELSEWHERE)
 
     def _model_px(self, arm: Floats, camera: CalibratedCamera, model: float) -> Floats:
         """Deviation of each point of a good posture from the arm, (M, 4), px; a wrist without a place is in line."""

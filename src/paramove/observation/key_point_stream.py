@@ -9,6 +9,7 @@ from pathlib import Path
 from paramove.cameras import CalibratedCamera, EndOfFrames, FrameError, open_source
 from paramove.documents import Image, InputError
 from paramove.observation.body_key_points import BodyKeyPoints, key_points_from
+from paramove.observation.network_files import stored_network
 from paramove.observation.pose_detection import PoseDetection
 from paramove.recording import read
 
@@ -28,8 +29,10 @@ def recorded_key_points(path: Path) -> Iterator[Seen]:
                 count += 1
                 captured_ns = one.message.captured.ToNanoseconds()
                 yield one.topic.removesuffix(ENDING), captured_ns, key_points_from(one.message)
-    except (OSError, KeyError) as error:
-        raise InputError(f"{path}: {error}; a recording of a run expected", missing=not path.exists()) from error
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; a recording of a run expected", missing=True) from error
+    except KeyError as error:
+        raise InputError(f"{path}: {error}; a recording of a run expected") from error
     if not count:
         raise InputError(
             f"{path} has no key points: record with `paramove launch pointing --with real` and the pose network"
@@ -56,8 +59,8 @@ def images_of(
     try:
         while True:
             now_ns = time.monotonic_ns() if live else now_ns + FILE_STEP_NS
-            for camera, source in opened:
-                frame = source.frame(now_ns)
+            frames = [(camera, source.frame(now_ns)) for camera, source in opened]  # at one time, not one by one
+            for camera, frame in frames:
                 if frame is None:
                     continue
                 size = frame.image_bgr.shape[1::-1]
@@ -79,24 +82,23 @@ def images_of(
 
 
 def detected_key_points(
-    images: Iterator[tuple[CalibratedCamera, int, Image]], tell: Callable[[str], None], networks: Path | None = None
+    images: Iterator[tuple[CalibratedCamera, int, Image]], report: Callable[[str], None], networks: Path | None = None
 ) -> Iterator[Seen]:
     """Camera, capture time, ns, and key points of images.
 
     Args:
         images: See `images_of`.
-        tell: Gets what is wrong with the pictures, when it changes.
+        report: Gets what is wrong with the pictures, when it changes.
         networks: See `PoseDetection`.
 
     Raises InputError without the pose network.
     """
-    detection, told = PoseDetection(networks), ""
-    if detection.trouble:
-        raise InputError(detection.trouble, missing=True)
+    stored_network(networks)
+    detection, reported = PoseDetection(networks), ""
     for camera, captured_ns, image in images:
         points = detection.detect(camera.name, image)
         if points is not None:
             yield camera.name, captured_ns, points
-        if detection.trouble != told:
-            told = detection.trouble
-            tell(told)
+        if detection.trouble != reported:
+            reported = detection.trouble
+            report(reported)

@@ -1,4 +1,4 @@
-"""The files of the pose network: fetched once inside a published package, checked, kept in the user's cache."""
+"""The files of the pose network: fetched once inside a published package, checked, stored in the user's cache."""
 
 from __future__ import annotations
 

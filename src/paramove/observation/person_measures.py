@@ -68,6 +68,7 @@ def measured_arm(
 
     Raises InputError for too few images, and for lengths that no arm has.
     """
+    check_scale(distance, height)
     arms = np.array([one.positions[0] for one in key_points]).reshape(-1, len(ARM_POINTS), 2)
     whole = np.isfinite(arms).all(axis=(1, 2))
     if whole.sum() < MIN_IMAGES:
@@ -89,11 +90,11 @@ def measured_arm(
     weights = np.array([usual_sd**-2, measured_sd**-2])
     upper_arm, forearm = (weights * [usual, measured]).sum(axis=0) / weights.sum(axis=0)
     lengths = {"upper_arm": float(upper_arm), "forearm": float(forearm), "hand": HAND_OF_FOREARM * float(forearm)}
-    for name, (least, most) in LIMITS_M.items():
-        if not least <= lengths[name] <= most:
+    for name, (low, high) in LIMITS_M.items():
+        if not low <= lengths[name] <= high:
             raise InputError(
-                f"the {name.replace('_', ' ')} seems to be {100.0 * lengths[name]:.0f} cm long, {100.0 * least:.0f} "
-                f"to {100.0 * most:.0f} cm expected: is the distance right, and was the whole arm in view?"
+                f"the {name.replace('_', ' ')} seems to be {100.0 * lengths[name]:.0f} cm long, {100.0 * low:.0f} "
+                f"to {100.0 * high:.0f} cm expected: is the distance right, and was the whole arm in view?"
             )
     resting = _resting(camera, _points(camera, seen, rays, along))
     return MeasuredArm(
@@ -102,6 +103,13 @@ def measured_arm(
         length_deviation=float(weights.sum(axis=0).min() ** -0.5),
         distance_deviation=deviation * along,
     )
+
+
+def check_scale(distance: float | None, height: float | None) -> None:
+    """Raises InputError for a distance or a height that no person has, m."""
+    for name, value, (low, high) in (("distance", distance, (0.3, 10.0)), ("height", height, (0.8, 2.5))):
+        if value is not None and not low <= value <= high:
+            raise InputError(f"expected a {name} of {low:g} to {high:g} m, found {value:g} m")
 
 
 def _rays(camera: CalibratedCamera, pixels: Floats) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from paramove.cameras import CalibratedCamera
 from paramove.documents import Floats, InputError
 from paramove.observation.body_key_points import BodyKeyPoints
-from paramove.observation.person_measures import RESTING_IMAGES, MeasuredArm, measured_arm
+from paramove.observation.person_measures import RESTING_IMAGES, MeasuredArm, check_scale, measured_arm
 
 STILL = 4.0
 """Deviations of a key point within which a resting hand stays."""
@@ -34,6 +34,7 @@ class PersonSetUp:
     """
 
     def __init__(self, camera: CalibratedCamera, *, distance: float | None = None, height: float | None = None) -> None:
+        check_scale(distance, height)
         self.prompt = HANG
         self.arm: MeasuredArm | None = None
         self._camera, self._distance, self._height = camera, distance, height
@@ -50,7 +51,7 @@ class PersonSetUp:
             if len(self._resting) < RESTING_IMAGES or np.ptp(hands, axis=0).max() > STILL:
                 return ""
             self.prompt = MOVE
-            return "the resting arm is seen"
+            return "the resting arm is detected"
         self._moving.append(points)
         if len(self._moving) < MOVING_IMAGES:
             return ""

@@ -70,8 +70,9 @@ class PoseDetection:
         self._folder = networks
         self._views: dict[str, _View] = {}
         self._missing = ""
+        self._unused: PoseNetwork | None = None
         try:
-            stored_network(networks)
+            self._unused = stored_network(networks)
         except InputError as error:
             self._missing = f"{error}. Until then the arm is tracked by its outline alone"
 
@@ -80,7 +81,8 @@ class PoseDetection:
         if self._missing:
             return None
         if camera not in self._views:
-            self._views[camera] = _View(stored_network(self._folder))
+            self._views[camera] = _View(self._unused or stored_network(self._folder))
+            self._unused = None
         return self._views[camera].detect(image)
 
     @property

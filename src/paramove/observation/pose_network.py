@@ -126,7 +126,7 @@ class PoseNetwork:
         return float(TURNS[self._votes.argmax()])
 
     def detect(self, image: Image) -> BodyKeyPoints:
-        """Of an image (H, W, 3), BGR. Nobody is searched in all of it, and in one of its parts in turn."""
+        """Of an image (H, W, 3), BGR. Without a person, the whole image and one of its windows are searched."""
         self._images += 1
         before = self._crop
         if self._voted < VOTES:

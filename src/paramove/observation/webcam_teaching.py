@@ -1,6 +1,6 @@
 """A person teaches a movement in front of calibrated cameras: from rest to known positions, touched with a fingertip.
 
-It reads no clock and draws nothing: key points in, what to tell the person and a growing demonstration set out. The
+It reads no clock and draws nothing: key points in, prompts for the person and a growing demonstration set out. The
 position that is touched is known, so it anchors the movement in space and is its theta.
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.cameras import WORLD_FRAME, CalibratedCamera
+from paramove.cameras import WORLD_FRAME, AlignedViews, CalibratedCamera
 from paramove.demonstrations import DemonstrationError, TaughtSet, moved_part
 from paramove.documents import Floats, InputError
 from paramove.observation.arm_body import ArmSizes
@@ -70,8 +70,8 @@ class WebcamTeacher:
         self._cameras = tuple(cameras)
         self._targets = list(targets.items())
         self._taught, self._sizes, self._shoulder = taught, sizes, shoulder
-        self._period_ns = round(1e9 / rate_hz)
-        self._latest: dict[int, tuple[int, BodyKeyPoints]] = {}
+        self._names = [camera.name for camera in cameras]
+        self._views = AlignedViews[BodyKeyPoints](self._names, 1.0 / rate_hz)
         self._track: list[_Seen] = []
         self._resting: Floats | None = None
         self._is_out = False
@@ -84,24 +84,20 @@ class WebcamTeacher:
         return self._done == len(self._targets)
 
     def see(self, camera: str, captured_ns: int, points: BodyKeyPoints) -> str:
-        """Adds the key points of an image; what has just happened, for the person, or ""."""
-        number = next(number for number, one in enumerate(self._cameras) if one.name == camera)
-        self._latest[number] = captured_ns, points
-        if number != 0 or self.finished:
-            return ""
-        together = tuple(self._at(other, captured_ns) for other in range(len(self._cameras)))
-        self._track.append(_Seen(captured_ns, together))
-        return self._judged()
+        """Adds the key points of an image; what has just happened, for the person, or "".
 
-    def drop(self) -> str:
-        """Deletes the latest movement and asks for it again; its recording. Raises DemonstrationError for none."""
-        name = self._taught.drop()
-        self._ask(self._done - 1)
-        return name
-
-    def _at(self, camera: int, at_ns: int) -> BodyKeyPoints | None:
-        time_ns, points = self._latest.get(camera, (0, None))
-        return points if points is not None and abs(at_ns - time_ns) <= self._period_ns else None
+        Raises InputError for a camera that is not among them.
+        """
+        if camera not in self._names:
+            raise InputError(
+                f"key points of {camera}, calibrated are {', '.join(self._names)}: is it their calibration?"
+            )
+        happened = ""
+        for views in self._views.add(camera, captured_ns, points):
+            if not self.finished:
+                self._track.append(_Seen(views.captured_ns, views.images))
+                happened = self._judged() or happened
+        return happened
 
     def _judged(self) -> str:
         """Follows rest, movement, touch and return by the hand in the first image."""
@@ -148,7 +144,9 @@ class WebcamTeacher:
             raise InputError(f"{100.0 * strange:.0f} % of the images show something else than the arm")
         off = np.linalg.norm(free.fingertip[-1] - target)
         if off > MAX_OFF_M * (1.0 if len(self._cameras) > 1 else 2.0):
-            raise InputError(f"the fingertip ends {100.0 * off:.0f} cm from the position, as seen: was it another one?")
+            raise InputError(
+                f"the fingertip ends {100.0 * off:.0f} cm from the position, as detected: was it another one?"
+            )
         touched = target, times[-1] - TOUCH_S
         return reconstructed(self._cameras, times, points, touched=touched, **known)  # type: ignore[arg-type]
 
@@ -166,9 +164,9 @@ def board_targets(corners: ArrayLike) -> dict[str, Floats]:
     points = np.asarray(corners, dtype=np.float64)
     low, high = points.min(axis=0), points.max(axis=0)
     names = [f"{row} {column}".strip() for row in ("near", "middle", "far") for column in ("right", "", "left")]
-    places = [(x, y) for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0)]
-    wanted = low[:2] + np.array(places) * (high - low)[:2]
-    nearest = [int(np.linalg.norm(points[:, :2] - place, axis=1).argmin()) for place in wanted]
+    fractions = [(x, y) for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0)]
+    grid = low[:2] + np.array(fractions) * (high - low)[:2]
+    nearest = [int(np.linalg.norm(points[:, :2] - place, axis=1).argmin()) for place in grid]
     return {f"the {name} corner": points[row] for name, row in zip(names, nearest, strict=True)}
 
 

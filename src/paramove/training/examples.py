@@ -69,8 +69,12 @@ class Examples:
     @property
     def _are_dependent(self) -> bool:
         """Whether a coordinate follows exactly from the others, as that of a point made from two others does."""
-        variances = np.linalg.eigvalsh(np.cov(np.concatenate(self.sequences), rowvar=False))
-        return bool(variances[0] < DEPENDENT * variances[-1])
+        covariance = np.cov(np.concatenate(self.sequences), rowvar=False)
+        variances = np.linalg.eigvalsh(covariance)
+        constant = (
+            np.diagonal(covariance).min() < DEPENDENT * variances[-1]
+        )  # that is an error, which the model reports
+        return bool(variances[0] < DEPENDENT * variances[-1] and not constant)
 
     @property
     def groups(self) -> list[str] | None:
@@ -98,8 +102,11 @@ class Examples:
         return MovementDescription(
             action=action, point_names=self.point_names, unit="m", frame=self.frame,
             parameter_names=self.parameter_names, duration=float(np.mean(seconds)), source=self.source,
-            rate_hz=self.rate_hz, arrival=1.0 if self._ends_at_theta else -1.0,
+            rate_hz=self.rate_hz, arrival=1.0 if self._of_action(action)._ends_at_theta else -1.0,
         )  # fmt: skip
+
+    def _of_action(self, action: str) -> Examples:
+        return self.of([number for number, label in enumerate(self.labels) if label == action])
 
     @property
     def _ends_at_theta(self) -> bool:

@@ -8,7 +8,7 @@ from paramove.documents import InputError
 from studies.multicam.cameras import moved_centre, read_calibration
 from studies.multicam.experiment import numbers_of, with_offsets
 from studies.teaching.experiment import camera_at
-from studies.teaching.simulated_person import key_points, performance
+from studies.teaching.simulated_person import key_points, movement
 
 PLACES = ((0.6, -1.8, 0.8), (1.7, -0.9, 0.75), (1.5, 1.0, 1.0))
 OFFSET = np.array([9.0, -6.0])
@@ -17,7 +17,7 @@ OFFSET = np.array([9.0, -6.0])
 @pytest.fixture(scope="module")
 def seen():
     true = [camera_at(f"camera_{number}", np.array(place)) for number, place in enumerate(PLACES)]
-    poses, rng = performance(np.array([0.2, 0.0, 0.0]), np.random.default_rng(0)), np.random.default_rng(1)
+    poses, rng = movement(np.array([0.2, 0.0, 0.0]), np.random.default_rng(0)), np.random.default_rng(1)
     tracks = [key_points(poses, camera, rng) for camera in true]
     return [moved_centre(true[0], -OFFSET), *true[1:]], tracks
 

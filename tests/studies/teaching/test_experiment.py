@@ -10,7 +10,7 @@ from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.robots import RobotDescription
 from paramove.training import examples_of, train_and_write, untrained
 from studies.teaching.experiment import ACTION, along, cameras, run, taught
-from studies.teaching.simulated_person import RATE_HZ, key_points, mean_path, performance
+from studies.teaching.simulated_person import RATE_HZ, key_points, mean_path, movement
 
 TARGET = np.array([0.2, 0.0, 0.0])
 ROBOT = Path(__file__).parents[3] / "robot_description" / "koch_v1_1"
@@ -41,7 +41,7 @@ def test_a_path_is_compared_by_where_it_leads():
 
 
 def test_key_points_have_the_measured_noise():
-    poses = performance(TARGET, np.random.default_rng(0))
+    poses = movement(TARGET, np.random.default_rng(0))
     still = np.repeat(poses[:1], 3000, axis=0)
     found = key_points(still, cameras(1)[0], np.random.default_rng(1))
     hands = np.array([one.positions[0, 3] for one in found])

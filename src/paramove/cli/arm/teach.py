@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import os
 import signal
 import time
 from dataclasses import replace
@@ -63,7 +61,6 @@ def teach(
 
     with explained():
         description = RobotDescription.load(robot)
-        _check_can_be_written(folder)
         teacher = KinestheticTeacher(description, folder, action, subject, append=append)
         baud_rate = description.bus.baud_rate if description.bus is not None else 0
     person = TerminalPerson()
@@ -84,15 +81,6 @@ def teach(
         raise typer.Exit(exit_codes.OK if teacher.taught.written else exit_codes.FAILURE) from None
     except KeyboardInterrupt:
         raise ended("interrupted", exit_codes.by_signal(signal.SIGINT)) from None
-
-
-def _check_can_be_written(folder: Path) -> None:
-    """Checks the folder before a person leads the arm. Raises OSError; makes no folder."""
-    place = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
-    number = 0 if place.is_dir() else errno.ENOTDIR
-    if number or not os.access(place, os.W_OK | os.X_OK):
-        number = number or errno.EACCES
-        raise OSError(number, os.strerror(number), str(place))
 
 
 def _of_this_arm(description: RobotDescription, arm: OpenArm) -> RobotDescription:
