@@ -1,5 +1,6 @@
 """`paramove webcam`: the pose network and the person's measures; exit codes."""
 
+import cv2
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -13,6 +14,7 @@ from paramove.observation import key_points_message
 from paramove.recording import RecordingWriter
 from studies.teaching.experiment import cameras
 from studies.teaching.simulated_person import RATE_HZ, key_points, movement
+from tests.observation.pictures import network, seated_person
 
 
 def test_a_file_that_is_not_the_package_ends_with_66(tmp_path):
@@ -66,3 +68,16 @@ def test_what_is_missing_or_wrong_is_named(recording, tmp_path, more, code, mess
     assert answer.exit_code == code, answer.output
     assert message in answer.stderr
     assert not (tmp_path / "person.yaml").exists()
+
+
+def test_a_first_look_needs_no_calibration(tmp_path):
+    network()
+    for number in range(10):
+        (tmp_path / f"{number}.png").write_bytes(cv2.imencode(".png", seated_person(7))[1].tobytes())
+    answer = CliRunner().invoke(app, ["look", "--source", f"folder:{tmp_path}@10"])
+    assert answer.exit_code == 0, answer.output
+    assert "picture's left" in answer.output
+    assert "directions only" in answer.output
+    answer = CliRunner().invoke(app, ["look", "--source", f"folder:{tmp_path}@10", "--size", "320x240"])
+    assert answer.exit_code == 78
+    assert "640 x 480" in answer.stderr

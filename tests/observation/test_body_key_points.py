@@ -58,3 +58,10 @@ def test_nobody_has_no_points():
     assert not BodyKeyPoints.nobody().has_person
     assert len(key_points_message(BodyKeyPoints.nobody(), 0).points) == 0
     assert not key_points_from(key_points_message(BodyKeyPoints.nobody(), 0)).has_person
+
+
+def test_the_direction_of_the_arm_needs_no_lens():
+    points = some_points()
+    points.positions[0, 0], points.positions[0, 3], points.depths[0, 3] = (100.0, 100.0), (184.0, 16.0), -0.3
+    np.testing.assert_allclose(points.arm_direction, np.array([1.0, -1.0, -1.0]) / np.sqrt(3.0), atol=1e-9)
+    assert np.isnan(BodyKeyPoints.nobody().arm_direction).all()

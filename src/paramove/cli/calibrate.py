@@ -105,7 +105,7 @@ def cameras(
     from paramove.cameras import write_cameras
 
     try:
-        placed = _calibrated(sources, _board(square, thickness), _pixels(size))
+        placed = _calibrated(sources, _board(square, thickness), pixels(size))
         write_cameras(out, [placement.camera for placement in placed])
     except InputError as error:
         raise _ended(str(error), error.exit_code) from error
@@ -128,7 +128,7 @@ def _board(square: str, thickness: str) -> Board:
     return Board(length(square, "--square"), thickness=length(thickness, "--thickness"))
 
 
-def _pixels(text: str) -> tuple[int, int]:
+def pixels(text: str) -> tuple[int, int]:
     match = re.fullmatch(r"(\d+)x(\d+)", text)
     if match is None:
         raise InputError(f"--size {text!r}: width and height in pixels expected, such as {LIVE_SIZE}")

@@ -51,6 +51,48 @@ def setup(
 
 
 @app.command()
+def look(
+    source: Annotated[
+        str, typer.Option(metavar="SOURCE", help="device:/dev/video0, file:VIDEO or folder:PICTURES@RATE")
+    ],
+    size: Annotated[str, typer.Option(metavar="WxH", help="resolution; files have their own")] = "640x480",
+) -> None:
+    """Try a camera in the first minute, uncalibrated: where the right arm points, once a second, and what is wrong.
+
+    Directions only, of the picture: 0, 0 is the camera's axis, away from it; without a calibration nothing is known of
+    distances, and a direction towards the camera may be 20 degrees off. Ctrl-C ends it.
+
+    Exit codes: 0 the file has ended, or Ctrl-C; 66 no pose network or camera; 78 a source of no use.
+    """
+    import numpy as np
+
+    from paramove.cameras import CalibratedCamera
+    from paramove.cli.calibrate import pixels
+    from paramove.documents import InputError
+    from paramove.observation import stored_network
+
+    try:
+        width, height = pixels(size)
+        stored_network()
+        camera = CalibratedCamera("webcam", width, height, np.diag([width, width, 1.0]), np.zeros(0), np.eye(4))
+        latest_s = -1.0
+        for _, captured_ns, points in seen_by([camera], [source]):
+            x, y, z = points.arm_direction
+            if captured_ns * 1e-9 - latest_s >= 1.0 and np.isfinite(z):
+                latest_s = captured_ns * 1e-9
+                aside, up = np.degrees(np.arctan2(x, np.hypot(y, z))), np.degrees(np.arctan2(-y, np.hypot(x, z)))
+                towards = "towards the camera" if z < 0.0 else "away from the camera"
+                typer.echo(
+                    f"right arm: {abs(aside):.0f} deg to the picture's {'right' if aside > 0 else 'left'}, "
+                    f"{abs(up):.0f} deg {'up' if up > 0 else 'down'}, {towards}; uncalibrated: directions only"
+                )
+    except KeyboardInterrupt:
+        return
+    except InputError as error:
+        raise ended(str(error), error.exit_code) from error
+
+
+@app.command()
 def person(
     out: Annotated[Path, typer.Option(metavar="FILE", help="YAML file to write; an existing one is overwritten")],
     source: Annotated[str, typer.Option(metavar="SOURCE", help=SOURCE)],

@@ -51,6 +51,15 @@ class BodyKeyPoints:
         """Whether any point is known."""
         return bool(np.isfinite(self.positions).any())
 
+    @property
+    def arm_direction(self) -> Floats:
+        """From the right shoulder to the hand, unit vector (3,) in the optical frame; NaN where it is unknown.
+
+        It needs no calibration: lengths in the image and depths are of the size that the network estimates.
+        """
+        along = np.append((self.positions[0, 3] - self.positions[0, 0]) / (self.px_per_m or np.nan), self.depths[0, 3])
+        return np.asarray(along / np.linalg.norm(along))
+
     def exchanged(self) -> BodyKeyPoints:
         """Right and left exchanged."""
         return BodyKeyPoints(

@@ -66,7 +66,7 @@ def images_of(
                 size = frame.image_bgr.shape[1::-1]
                 if size != (camera.width_px, camera.height_px):
                     raise InputError(
-                        f"{camera.name} gives {size[0]} x {size[1]} px, calibrated are {camera.width_px} x "
+                        f"{camera.name} gives {size[0]} x {size[1]} px, expected are {camera.width_px} x "
                         f"{camera.height_px} px"
                     )
                 yield camera, frame.captured_ns, frame.image_bgr
