@@ -87,7 +87,7 @@ def read_reference(folder: Path, camera: CalibratedCamera, key_points: Sequence[
     """Of a recording; the shoulder by the key points of each frame. Raises InputError."""
     path = folder / REFERENCE
     try:
-        arrays = read_arrays(path, "reference of where the hand is seen")
+        arrays = read_arrays(path, "reference positions of the hand")
         pixels, hand = (np.asarray(arrays[name], dtype=np.float64) for name in ("uv", "xyz_m"))
     except (ValueError, KeyError, TypeError) as error:
         if isinstance(error, InputError):

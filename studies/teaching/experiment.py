@@ -47,7 +47,7 @@ def camera_at(name: str, place: Floats) -> CalibratedCamera:
 
 
 def taught(folder: Path, count: int, seed: int) -> list[str]:
-    """A set taught in front of so many cameras; what the person was prompted."""
+    """A set taught in front of so many cameras; the messages to the person."""
     rng, views = np.random.default_rng(seed), cameras(count)
     targets = board_targets(Board(SQUARE_M).corners())
     known: dict[str, Any] = {}
@@ -58,17 +58,17 @@ def taught(folder: Path, count: int, seed: int) -> list[str]:
         known["shoulder"] = RESTING_SHOULDER + MEASURED_M * rng.standard_normal(3)
     written = TaughtSet(folder, ACTION, "simulated", "simulated key points")
     teacher = WebcamTeacher(views, targets, written, rate_hz=RATE_HZ, **known)
-    said, frame = [], 0
+    messages, frame = [], 0
     for target in targets.values():
         poses = movement(target, rng)
         tracks = [key_points(poses, camera, rng) for camera in views]
         for now in range(len(poses)):
             frame += 1
-            said += [told for told in _shown(teacher, views, tracks, now, round(frame * 1e9 / RATE_HZ)) if told]
-    return said
+            messages += [one for one in _handled(teacher, views, tracks, now, round(frame * 1e9 / RATE_HZ)) if one]
+    return messages
 
 
-def _shown(
+def _handled(
     teacher: WebcamTeacher, views: Sequence[CalibratedCamera], tracks: Sequence[Sequence[BodyKeyPoints]], now: int,
     at_ns: int,
 ) -> list[str]:  # fmt: skip
@@ -110,6 +110,6 @@ def run(count: int, seed: int) -> dict[str, Any]:
     """One person who teaches, and what the model of it gives."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary) / "set"
-        said = taught(folder, count, seed)
-        written = sum(": " in one and "touched" in one for one in said)
+        messages = taught(folder, count, seed)
+        written = sum(": " in one and "touched" in one for one in messages)
         return {"cameras": count, "seed": seed, "movements": written, **errors_cm(trained(folder), seed)}

@@ -64,7 +64,9 @@ def webcam(
         raise ended(f"--targets {targets!r}: 'board' expected", exit_codes.USAGE)
     with one_line():
         calibrated = measured_cameras(Path(), cameras)
-        taught = TaughtSet(folder, action, subject, "shown to cameras; theta is the touched position", append=append)
+        taught = TaughtSet(
+            folder, action, subject, "performed before cameras; theta is the touched position", append=append
+        )
         places = board_targets(Board(length(square, "--square")).corners())
         who = None if person is None else read_person(person)
         sizes, shoulder = (None, None) if who is None else (who.sizes, who.shoulder)
@@ -78,10 +80,10 @@ def webcam(
         raise typer.Exit(exit_codes.FAILURE)
 
 
-def _lead(teacher: WebcamTeacher, seen: Iterator[tuple[str, int, BodyKeyPoints]]) -> None:
+def _lead(teacher: WebcamTeacher, key_points: Iterator[tuple[str, int, BodyKeyPoints]]) -> None:
     """Until all positions are touched, or the images end."""
     typer.echo(teacher.prompt)
-    for camera, captured_ns, points in seen:
+    for camera, captured_ns, points in key_points:
         happened = teacher.see(camera, captured_ns, points)
         if happened:
             typer.echo(printable(happened))

@@ -1,7 +1,7 @@
 """The whole movement of an arm from the key points of one or several cameras: for recordings that teach.
 
 The most probable path of shoulder, elbow, wrist and hand given all images at once: a smooth one (white acceleration),
-seen with the network's noise, with exchanged sides and outliers, with bones of constant length if they are known, and
+detected with the network's noise, exchanged sides and outliers, with bones of constant length if they are known, and
 with the fingertip at a known position at the end if it touches one. Gauss-Newton steps on a banded system.
 """
 
@@ -90,9 +90,9 @@ def reconstructed(
         model = max(FINE_M, COARSE_M * 0.5**step)
         system = _System(times)
         for number, camera in enumerate(cameras):
-            for frame, seen in enumerate(key_points[number]):
-                if seen is not None and seen.has_person:
-                    sides[number, frame] = _see(system, comparing, camera, frame, points[frame], seen, model)
+            for frame, detected in enumerate(key_points[number]):
+                if detected is not None and detected.has_person:
+                    sides[number, frame] = _see(system, comparing, camera, frame, points[frame], detected, model)
         if sizes is not None:
             for bone, length in enumerate((sizes.upper_arm, sizes.forearm, 0.5 * sizes.hand)):
                 system.add_length(points, bone, length)
@@ -111,13 +111,13 @@ def reconstructed(
 
 def _see(
     system: _System, comparing: KeyPointObserver, camera: CalibratedCamera, frame: int, arm: Floats,
-    seen: BodyKeyPoints, model: float,
+    detected: BodyKeyPoints, model: float,
 ) -> int:  # fmt: skip
     """Adds the key points of an image, of the side that is the likelier one; that side."""
-    side = int(comparing.hypotheses(arm[None], camera, seen, model)[:, 0].argmax())
+    side = int(comparing.hypotheses(arm[None], camera, detected, model)[:, 0].argmax())
     if side >= len(SIDES):
         return side
-    own, total = comparing.densities(arm[None], camera, seen, side, model)
+    own, total = comparing.densities(arm[None], camera, detected, side, model)
     weights = np.exp(own - total)[0]
     turn = camera.camera_from_world[:3, :3]
     local = arm @ turn.T + camera.camera_from_world[:3, 3]
@@ -127,12 +127,12 @@ def _see(
         if z <= 0.0:
             continue
         slopes = scale[:, None] * (turn[:2] - np.array([[x / z], [y / z]]) * turn[2]) / z
-        off = seen.positions[side, point] - camera.project(arm[point])
+        off = detected.positions[side, point] - camera.project(arm[point])
         rows = np.zeros((2, DIMENSIONS))
         rows[:, 3 * point : 3 * point + 3] = slopes
-        system.add(frame, rows, off, weights[point] / seen.deviations[side, point] ** 2)
+        system.add(frame, rows, off, weights[point] / detected.deviations[side, point] ** 2)
         deviation = comparing.options.depths[point]
-        depth = seen.depths_at(local[SHOULDER, 2], scale[0])[side, point]
+        depth = detected.depths_at(local[SHOULDER, 2], scale[0])[side, point]
         if np.isfinite(deviation) and np.isfinite(depth):
             row = np.zeros((1, DIMENSIONS))
             row[0, 3 * point : 3 * point + 3], row[0, :3] = turn[2], -turn[2]
@@ -202,12 +202,12 @@ def _first_guess(
     shoulder: Floats | None,
 ) -> Floats:  # fmt: skip
     """Where two cameras' rays meet; with one, along its rays by the network's depths. Gaps are filled linearly."""
-    seen = np.array(
+    detected = np.array(
         [[np.full((POINTS, 2), np.nan) if one is None else one.positions[0] for one in row] for row in key_points]
     )  # (K, T, 4, 2)
-    count = seen.shape[1]
+    count = detected.shape[1]
     if len(cameras) > 1:
-        flat = seen.reshape(len(cameras), -1, 2)
+        flat = detected.reshape(len(cameras), -1, 2)
         points = StereoRig(cameras).triangulate(flat).points.reshape(count, POINTS, 3)
     else:
         assert shoulder is not None
@@ -237,11 +237,11 @@ def _without_jumps(points: Floats) -> Floats:
     return np.where((off > JUMP_M)[..., None], np.nan, points)
 
 
-def _along_rays(camera: CalibratedCamera, seen: BodyKeyPoints | None, shoulder: Floats) -> Floats:
-    if seen is None:
+def _along_rays(camera: CalibratedCamera, detected: BodyKeyPoints | None, shoulder: Floats) -> Floats:
+    if detected is None:
         return np.full((POINTS, 3), np.nan)
     turn, shift = camera.camera_from_world[:3, :3], camera.camera_from_world[:3, 3]
     away = float((turn @ shoulder + shift)[2])
-    depth = away + seen.depths_at(away, camera.matrix[0, 0])[0]
-    rays = np.column_stack([seen.positions[0], np.ones(POINTS)]) @ np.linalg.inv(camera.matrix).T
+    depth = away + detected.depths_at(away, camera.matrix[0, 0])[0]
+    rays = np.column_stack([detected.positions[0], np.ones(POINTS)]) @ np.linalg.inv(camera.matrix).T
     return np.asarray((depth[:, None] * rays - shift) @ turn)

@@ -112,23 +112,23 @@ class KeyPointObserver:
         result = np.where(usable, 0.0, -np.inf)
         if usable.any():
             arm = self._arm_points(fitted[usable])
-            for camera, points in self._seen():
+            for camera, points in self._detected():
                 result[usable] += np.logaddexp.reduce(self.hypotheses(arm, camera, points, self.options.model), axis=0)
         return result
 
     def corrected(self, pose: ArrayLike) -> Floats:
-        """The posture (D,), m, in the world, moved to where the key points are seen; lengths may be off by some cm.
+        """The posture (D,), m, in the world, moved to where the key points are; lengths may be off by some cm.
 
         The most probable posture, linearised, of one that is off by `across` and `along`. Only images whose points are
         probably of this arm count, and of them the points that are probably no outliers.
         """
         before = np.asarray(pose, dtype=np.float64)
-        seen = self._seen()
-        if not seen or not np.isfinite(before).all():
+        detected = self._detected()
+        if not detected or not np.isfinite(before).all():
             return before
         arm = self._arm_points(before[None])
-        precision, towards = self._prior(before, [camera for camera, _ in seen]), np.zeros(len(before))
-        for camera, points in seen:
+        precision, towards = self._prior(before, [camera for camera, _ in detected]), np.zeros(len(before))
+        for camera, points in detected:
             hypotheses = self.hypotheses(arm, camera, points, self.options.across)[:, 0]
             hypothesis = int(hypotheses.argmax())
             if hypothesis >= len(SIDES):
@@ -143,7 +143,7 @@ class KeyPointObserver:
                 towards += weight * slopes[point].T @ (points.positions[hypothesis, point] - projected[point])
         return np.asarray(before + np.linalg.solve(precision, towards))
 
-    def _seen(self) -> list[tuple[CalibratedCamera, BodyKeyPoints]]:
+    def _detected(self) -> list[tuple[CalibratedCamera, BodyKeyPoints]]:
         return [(one, points) for one, points in zip(self.cameras, self._points, strict=True) if points is not None]
 
     def _arm_points(self, poses: Floats) -> Floats:

@@ -76,15 +76,15 @@ def measured_arm(
             f"the right arm is in view in {whole.sum()} images, {MIN_IMAGES} are needed: sit where the camera sees "
             "head, shoulders and the whole arm, and move it for some seconds"
         )
-    seen = [one for one, good in zip(key_points, whole, strict=True) if good]
+    detected = [one for one, good in zip(key_points, whole, strict=True) if good]
     rays = _rays(camera, arms[whole])
     usual = np.array([UPPER_ARM_OF_HEIGHT, FOREARM_OF_HEIGHT]) * (MEAN_HEIGHT_M if height is None else height)
     if distance is not None:
         deviation, along = DISTANCE_SD / distance, distance
     else:
         deviation = HEIGHT_SD if height is not None else ANY_HEIGHT_SD
-        along = _distance_of(camera, seen, rays, float(usual.sum()))
-    measured = _lengths(_points(camera, seen, rays, along))
+        along = _distance_of(camera, detected, rays, float(usual.sum()))
+    measured = _lengths(_points(camera, detected, rays, along))
     usual_sd = usual * (ANY_HEIGHT_SD if height is None else HEIGHT_SD)
     measured_sd = np.hypot(LENGTHS_SD, deviation * usual)
     weights = np.array([usual_sd**-2, measured_sd**-2])
@@ -96,7 +96,7 @@ def measured_arm(
                 f"the {name.replace('_', ' ')} seems to be {100.0 * lengths[name]:.0f} cm long, {100.0 * low:.0f} "
                 f"to {100.0 * high:.0f} cm expected: is the distance right, and was the whole arm in view?"
             )
-    resting = _resting(camera, _points(camera, seen, rays, along))
+    resting = _resting(camera, _points(camera, detected, rays, along))
     return MeasuredArm(
         **lengths,
         resting=resting,
@@ -118,9 +118,9 @@ def _rays(camera: CalibratedCamera, pixels: Floats) -> Floats:
     return np.asarray(flat @ np.linalg.inv(camera.matrix).T)
 
 
-def _points(camera: CalibratedCamera, seen: Sequence[BodyKeyPoints], rays: Floats, along: float) -> Floats:
+def _points(camera: CalibratedCamera, detected: Sequence[BodyKeyPoints], rays: Floats, along: float) -> Floats:
     """Right arms with the shoulder at that depth, (N, 4, 3), m, in the camera's frame."""
-    depths = np.array([one.depths_at(along, camera.matrix[0, 0])[0] for one in seen])
+    depths = np.array([one.depths_at(along, camera.matrix[0, 0])[0] for one in detected])
     return np.asarray((along + depths)[..., None] * rays)
 
 
@@ -129,12 +129,12 @@ def _lengths(points: Floats) -> Floats:
     return np.asarray(np.median(np.linalg.norm(np.diff(points[:, :3], axis=1), axis=2), axis=0))
 
 
-def _distance_of(camera: CalibratedCamera, seen: Sequence[BodyKeyPoints], rays: Floats, arm: float) -> float:
+def _distance_of(camera: CalibratedCamera, detected: Sequence[BodyKeyPoints], rays: Floats, arm: float) -> float:
     """The depth of the shoulder, m, at which upper arm and forearm together have that length."""
     low, high = 0.3, 10.0
     for _ in range(40):
         middle = 0.5 * (low + high)
-        shorter = _lengths(_points(camera, seen, rays, middle)).sum() < arm
+        shorter = _lengths(_points(camera, detected, rays, middle)).sum() < arm
         low, high = (middle, high) if shorter else (low, middle)
     return low
 

@@ -62,8 +62,8 @@ class PersonSetUp:
 
     def _measured(self) -> str:
         try:
-            seen = [*self._resting, *self._moving]
-            self.arm = measured_arm(self._camera, seen, distance=self._distance, height=self._height)
+            images = [*self._resting, *self._moving]
+            self.arm = measured_arm(self._camera, images, distance=self._distance, height=self._height)
         except InputError as error:
             self.prompt, self._moving = HANG, []
             self._resting.clear()

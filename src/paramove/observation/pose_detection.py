@@ -63,7 +63,7 @@ class PoseDetection:
     Args:
         networks: Folder of the networks, by default that of the user's cache.
 
-    Without the networks nothing is detected, and `trouble` says why.
+    Without the networks nothing is detected, and `trouble` gives the reason.
     """
 
     def __init__(self, networks: Path | None = None) -> None:

@@ -40,7 +40,7 @@ LONGEST_S = 10.0
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _Detected:
     at_ns: int
     points: tuple[BodyKeyPoints | None, ...]
 
@@ -72,7 +72,7 @@ class WebcamTeacher:
         self._taught, self._sizes, self._shoulder = taught, sizes, shoulder
         self._names = [camera.name for camera in cameras]
         self._views = AlignedViews[BodyKeyPoints](self._names, 1.0 / rate_hz)
-        self._track: list[_Seen] = []
+        self._track: list[_Detected] = []
         self._resting: Floats | None = None
         self._is_out = False
         self._done = 0
@@ -95,7 +95,7 @@ class WebcamTeacher:
         happened = ""
         for views in self._views.add(camera, captured_ns, points):
             if not self.finished:
-                self._track.append(_Seen(views.captured_ns, views.images))
+                self._track.append(_Detected(views.captured_ns, views.images))
                 happened = self._judged() or happened
         return happened
 
@@ -134,7 +134,7 @@ class WebcamTeacher:
         self._ask(self._done + 1)
         return f"{recording}: {name} touched"
 
-    def _reconstructed(self, track: Sequence[_Seen], target: Floats) -> ArmMovement:
+    def _reconstructed(self, track: Sequence[_Detected], target: Floats) -> ArmMovement:
         times = np.array([one.at_ns - track[0].at_ns for one in track]) * 1e-9
         points = [[one.points[number] for one in track] for number in range(len(self._cameras))]
         known = {"sizes": self._sizes, "shoulder": self._shoulder, "hangs_until_s": 0.5 * STILL_S}
@@ -187,7 +187,7 @@ def _still(hands: Floats) -> Floats | None:
     return hand if near.sum() >= MIN_STILL * len(hands) else None
 
 
-def _hand(seen: _Seen) -> Floats:
+def _hand(detected: _Detected) -> Floats:
     """Of the right arm in the first image, in deviations."""
-    first = seen.points[0]
+    first = detected.points[0]
     return np.full(2, np.nan) if first is None else first.positions[0, 3] / first.deviations[0, 0]

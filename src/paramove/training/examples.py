@@ -110,7 +110,7 @@ class Examples:
 
     @property
     def _ends_at_theta(self) -> bool:
-        """Whether the fingertip, or the middle of fingers and knuckle, always ends where theta says."""
+        """Whether the fingertip, or the middle of fingers and knuckle, always ends at theta."""
         if not all(name[-2:] in AXIS_ENDINGS for name in self.parameter_names):
             return False
         axes = [AXIS_ENDINGS.index(name[-2:]) for name in self.parameter_names]

@@ -100,7 +100,7 @@ def test_without_depth_images_the_shoulder_is_unknown(tmp_path):
 )
 def test_a_reference_of_no_use_is_told(tmp_path, arrays):
     camera = write_lens(tmp_path)
-    with pytest.raises(InputError, match="where the hand is seen") as caught:
+    with pytest.raises(InputError, match="positions of the hand") as caught:
         read_reference(tmp_path, camera, [])
     assert caught.value.missing
     np.savez(tmp_path / "hand_reference.npz", **arrays)
