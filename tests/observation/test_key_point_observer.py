@@ -138,3 +138,15 @@ def test_one_view_hardly_changes_the_distance_from_the_camera():
     estimated[6:9] += 0.05 * ray
     comparing.look([seen(true, CAMERAS[0])])
     assert np.linalg.norm(comparing.corrected(estimated)[6:9] - estimated[6:9]) < 0.01
+
+
+def test_an_arm_is_detected_near_its_posture_only():
+    comparing, poses = observer(), some_poses(2)
+    assert not comparing.detects(poses[0])
+    points = seen(poses[0], CAMERAS[0])
+    comparing.look([points])
+    assert comparing.detects(poses[0])
+    assert comparing.detects(poses[0] + 0.03)
+    assert not comparing.detects(np.full(9, np.nan))
+    points.positions[...] += 4000.0
+    assert not comparing.detects(poses[0])

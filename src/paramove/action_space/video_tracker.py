@@ -11,7 +11,7 @@ from paramove.action_space.awaited_key_points import Awaited, AwaitedKeyPoints, 
 from paramove.action_space.tracker import ActionTracker, TrackEstimate
 from paramove.cameras import AlignedViews, CalibratedCamera, CameraWatch, Views
 from paramove.documents import Floats, Image
-from paramove.observation import ArmObserver, BodyKeyPoints, KeyPointObserver
+from paramove.observation import ArmObserver, BodyKeyPoints, KeyPointObserver, Presence
 
 MIN_SHARPNESS = 3.0
 """Grey levels per px that the strongest edges of an image reach; noise in the dark stays below 2, a lit scene is above
@@ -169,7 +169,7 @@ class VideoTracker:
         self._key_points.look(points)
         time_s = (views.captured_ns - self._started_ns) * 1e-9
         elapsed_s = _since_last(self._tracker, time_s)
-        estimate = self._tracker.update(time_s, self._log_likelihoods, self._observer.presence)
+        estimate = self._tracker.update(time_s, self._log_likelihoods, self._presence)
         estimate = replace(estimate, pose=self._key_points.corrected(estimate.pose))
         self._uncertainty = estimate.detail
         first = next(iter(self._cameras.values()))
@@ -196,6 +196,10 @@ class VideoTracker:
         """ln P of images and key points, taken as independent."""
         result = self._observer.log_likelihoods(poses)
         return result + self._key_points.log_likelihoods(poses) if any(self._key_points.has_points) else result
+
+    def _presence(self, pose: Floats) -> Presence:
+        """By the background, unless key points show that the arm is there: other things may change too."""
+        return Presence() if self._key_points.detects(pose) else self._observer.presence(pose)
 
     def _look(self, images: Sequence[Image | None]) -> list[str]:
         """Gives the observer the images that contain edges; messages about the others."""

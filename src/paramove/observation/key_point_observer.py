@@ -116,6 +116,15 @@ class KeyPointObserver:
                 result[usable] += np.logaddexp.reduce(self.hypotheses(arm, camera, points, self.options.model), axis=0)
         return result
 
+    def detects(self, pose: ArrayLike) -> bool:
+        """Whether the key points of some camera are probably of an arm near this posture, (D,), m, in the world."""
+        one = np.asarray(pose, dtype=np.float64)
+        if not np.isfinite(one).all():
+            return False
+        arm = self._arm_points(one[None])
+        return any(int(self.hypotheses(arm, *view, self.options.across)[:, 0].argmax()) < len(SIDES)
+                   for view in self._detected())  # fmt: skip
+
     def corrected(self, pose: ArrayLike) -> Floats:
         """The posture (D,), m, in the world, moved to where the key points are; lengths may be off by some cm.
 
