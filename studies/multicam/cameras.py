@@ -65,7 +65,7 @@ def moved_centre(camera: CalibratedCamera, offset_px: ArrayLike) -> CalibratedCa
 
 def detected(folder: Path, camera: CalibratedCamera, done: Callable[[str], None]) -> list[BodyKeyPoints]:
     """Key points of each image of a camera's video. Raises InputError."""
-    capture, network = opened_video(folder / f"{camera.name}.mp4"), stored_network()
+    capture, network = opened_video(folder / f"{camera.name}.mp4"), stored_network(offline=True)
     found: list[BodyKeyPoints] = []
     try:
         while True:

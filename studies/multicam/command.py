@@ -22,10 +22,13 @@ def multicam(
 ) -> None:
     """Reconstruct a balancing person's arm from key points of four cameras; no truth: they are judged by each other.
 
+    With the heavy network if `paramove webcam setup --heavy` has fetched it, else with the usual one.
+
     Exit codes: 0 done; 66 the recording or the pose network is missing.
     """
     from paramove.demonstrations import RecordingsError, data_folder
     from paramove.documents import InputError
+    from paramove.observation import has_heavy
     from studies.multicam.cameras import detected, read_calibration
     from studies.multicam.experiment import numbers_of
 
@@ -35,7 +38,7 @@ def multicam(
         cameras = read_calibration(folder)
         with console.status("detecting key points") as status:
             tracks = [detected(folder, camera, status.update) for camera in cameras]
-            numbers = numbers_of(cameras, tracks)
+            numbers = {"network": "heavy" if has_heavy() else "full", **numbers_of(cameras, tracks)}
     except (RecordingsError, InputError) as error:
         Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
         raise typer.Exit(exit_codes.INPUT_MISSING) from error

@@ -29,7 +29,7 @@ class ScriptedNetwork:
 @pytest.fixture
 def scripted(monkeypatch):
     found = ScriptedNetwork()
-    monkeypatch.setattr(pose_detection, "stored_network", lambda folder: found)
+    monkeypatch.setattr(pose_detection, "stored_network", lambda folder, offline: found)
     return found
 
 

@@ -34,17 +34,23 @@ def setup(
     wheel: Annotated[
         Path | None, typer.Option(metavar="FILE", help="the package as a file, for a machine without network")
     ] = None,
+    heavy: Annotated[
+        bool, typer.Option("--heavy", help="also a slower, more exact one for video files (41 MB, needs npm)")
+    ] = False,
+    heavy_package: Annotated[Path | None, typer.Option(metavar="FILE", help="the same as a file")] = None,
 ) -> None:
     """Fetch the pose network that finds a person's arms in pictures (35.6 MB, once), and check it.
 
     Exit codes: 0 it is there; 66 it could not be had.
     """
     from paramove.documents import InputError
-    from paramove.observation import fetch_networks, stored_network
+    from paramove.observation import HEAVY, fetch_networks, stored_network
 
     try:
         folder = fetch_networks(wheel)
-        stored_network(folder)
+        if heavy or heavy_package is not None:
+            fetch_networks(heavy_package, package=HEAVY)
+        stored_network(folder, offline=True)
     except InputError as error:
         raise ended(str(error), exit_codes.INPUT_MISSING) from error
     typer.echo(f"the pose network is in {folder}")
@@ -206,4 +212,7 @@ def seen_by(
     if len(sources) != len(cameras):
         raise InputError(f"{len(cameras)} cameras are calibrated, {len(sources)} sources given: one --source for each")
     images = images_of(cameras, sources) if images is None else images
-    return detected_key_points(images, lambda trouble: typer.echo(printable(trouble or "all is well again")))
+    offline = not any(source.startswith("device:") for source in sources)
+    return detected_key_points(
+        images, lambda trouble: typer.echo(printable(trouble or "all is well again")), offline=offline
+    )

@@ -24,7 +24,10 @@ from .markers import DEFAULT_MARKERS as DEFAULT_MARKERS
 from .markers import ArucoMarker as ArucoMarker
 from .markers import BodyTrackerOptions as BodyTrackerOptions
 from .markers import StereoBodyTracker as StereoBodyTracker
+from .network_files import HEAVY as HEAVY
+from .network_files import USUAL as USUAL
 from .network_files import fetch_networks as fetch_networks
+from .network_files import has_heavy as has_heavy
 from .network_files import stored_network as stored_network
 from .options import Likelihood as Likelihood
 from .options import ObservationOptions as ObservationOptions

@@ -82,19 +82,19 @@ def images_of(
 
 
 def detected_key_points(
-    images: Iterator[tuple[CalibratedCamera, int, Image]], report: Callable[[str], None], networks: Path | None = None
+    images: Iterator[tuple[CalibratedCamera, int, Image]], report: Callable[[str], None], *, offline: bool = False
 ) -> Iterator[Seen]:
     """Camera, capture time, ns, and key points of images.
 
     Args:
         images: See `images_of`.
         report: Gets what is wrong with the pictures, when it changes.
-        networks: See `PoseDetection`.
+        offline: See `stored_network`.
 
     Raises InputError without the pose network.
     """
-    stored_network(networks)
-    detection, reported = PoseDetection(networks), ""
+    stored_network(offline=offline)
+    detection, reported = PoseDetection(offline=offline), ""
     for camera, captured_ns, image in images:
         points = detection.detect(camera.name, image)
         if points is not None:

@@ -62,17 +62,18 @@ class PoseDetection:
 
     Args:
         networks: Folder of the networks, by default that of the user's cache.
+        offline: See `stored_network`.
 
     Without the networks nothing is detected, and `trouble` gives the reason.
     """
 
-    def __init__(self, networks: Path | None = None) -> None:
-        self._folder = networks
+    def __init__(self, networks: Path | None = None, *, offline: bool = False) -> None:
+        self._folder, self._offline = networks, offline
         self._views: dict[str, _View] = {}
         self._missing = ""
         self._unused: PoseNetwork | None = None
         try:
-            self._unused = stored_network(networks)
+            self._unused = stored_network(networks, offline=offline)
         except InputError as error:
             self._missing = f"{error}. Until then the arm is tracked by its outline alone"
 
@@ -81,7 +82,7 @@ class PoseDetection:
         if self._missing:
             return None
         if camera not in self._views:
-            self._views[camera] = _View(self._unused or stored_network(self._folder))
+            self._views[camera] = _View(self._unused or stored_network(self._folder, offline=self._offline))
             self._unused = None
         return self._views[camera].detect(image)
 
