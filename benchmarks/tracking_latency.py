@@ -23,6 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from paramove.action_space import Person, write_person  # noqa: E402
 from paramove.bus import topics  # noqa: E402
 from paramove.cameras import write_cameras  # noqa: E402
 from paramove.recording import read  # noqa: E402
@@ -89,8 +90,8 @@ def measured_on_a_person(folder: Path, data: Path | None, particles: int) -> dic
     """Replays real pictures through the stack with the pose network."""
     recording = recording_folder(data)
     write_cameras(folder / "cameras.yaml", [seated_person.camera(recording)])
-    measures = f"upper_arm: {SIZES.upper_arm}\nforearm: {SIZES.forearm}\nhand: {SIZES.hand}\n"
-    (folder / "person.yaml").write_text(f"shoulder: [-2.33, 0.14, 0.92]\n{measures}", encoding="utf-8")
+    sizes = {"upper_arm": SIZES.upper_arm, "forearm": SIZES.forearm, "hand": SIZES.hand}
+    write_person(folder / "person.yaml", Person(shoulder=(-2.33, 0.14, 0.92), **sizes))
     pictures = sorted((recording / "color").glob("*.jpg"))
     (folder / "pictures").mkdir()
     for number in range(PICTURES):

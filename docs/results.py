@@ -222,8 +222,8 @@ def real_images(out: Path) -> dict[str, Any]:
     for name in sorted(found["cases"], key=lambda name: (name not in order, order.index(name) if name in order else 0)):
         runs = found["cases"][name]
         row: dict[str, Any] = {"name": name}
-        for frames, short in (("6-9", "short"), ("32-50", "long"), ("43-49", "swing"), ("all", "all")):
-            frames = "all frames" if frames == "all" else f"frames {frames}"
+        ranges = {"short": "frames 6-9", "long": "frames 32-50", "swing": "frames 43-49", "all": "all frames"}
+        for short, frames in ranges.items():
             for number, key in (
                 ("median_px", "px"), ("far_frames", "far"), ("lost_frames", "lost"), ("hand_cm", "hand"),
                 ("from_shoulder_cm", "relative"), ("direction_deg", "direction"),

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from ruamel.yaml import YAML
 
+from paramove.action_space import Person, write_person
 from paramove.bus import Received, Topic, topics
 from paramove.cameras import write_cameras
 from paramove.demonstrations import table_place
@@ -76,11 +76,8 @@ class PointingWorld:
         """What people measure beforehand: `cameras.yaml`, with the errors of a calibration, and `person.yaml`."""
         write_cameras(folder / "cameras.yaml", [self._studio.calibrated[view - 1] for view in self._views])
         person = self._studio.performance.person
-        measures: dict[str, Any] = {"shoulder": [round(float(value), 3) for value in person.measured_shoulder]}
-        for name in ("upper_arm", "forearm", "hand"):
-            measures[name] = round(float(getattr(person.measured, name)), 3)
-        with (folder / "person.yaml").open("w", encoding="utf-8") as file:
-            YAML().dump(measures, file)
+        sizes = {name: getattr(person.measured, name) for name in ("upper_arm", "forearm", "hand")}
+        write_person(folder / "person.yaml", Person(shoulder=tuple(person.measured_shoulder), **sizes))
 
     def layout(self) -> None:
         """None: what does not change is in the measures."""

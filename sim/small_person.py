@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from ruamel.yaml import YAML
 
+from paramove.action_space import Person, write_person
 from paramove.demonstrations import SAMPLE_RATE_HZ
 from paramove.documents import Floats
 from paramove.observation import ArmSizes
@@ -108,11 +108,8 @@ class SmallPerson:
     def write_measures(self, path: Path) -> None:
         """Measured sizes of this person, in the table frame: up to 3 % and 2 mm wrong."""
         shoulder = _table_from_human(self._performer.measured_shoulder)
-        measures: dict[str, object] = {"shoulder": [round(float(value), 4) for value in shoulder]}
-        for name in ("upper_arm", "forearm", "hand"):
-            measures[name] = round(SCALE * float(getattr(self._performer.measured, name)), 4)
-        with path.open("w", encoding="utf-8") as file:
-            YAML().dump(measures, file)
+        sizes = {name: SCALE * getattr(self._performer.measured, name) for name in ("upper_arm", "forearm", "hand")}
+        write_person(path, Person(shoulder=tuple(shoulder), **sizes), decimals=4)
 
     def points_at(self, place: ArrayLike, draw: np.random.Generator) -> PointingMovement:
         """The person points at a place (3,), m, in the robot's shoulder frame, and takes the hand back.

@@ -16,6 +16,7 @@ from paramove.documents import Floats
 from paramove.observation import BodyKeyPoints, WebcamTeacher, board_targets
 from paramove.phmm import ParametricHMM
 from paramove.training import examples_of, train_and_write, untrained
+from sim.performances_scene import looking
 from studies.teaching.simulated_person import RATE_HZ, SIZES, key_points, mean_path, movement
 
 SQUARE_M = 0.03
@@ -35,12 +36,8 @@ def cameras(count: int) -> list[CalibratedCamera]:
 
 
 def camera_at(name: str, place: Floats) -> CalibratedCamera:
-    forward = np.array([0.0, -0.15, 0.2]) - place
-    forward = forward / np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right = right / np.linalg.norm(right)
     pose = np.eye(4)
-    pose[:3, :3] = np.stack([right, np.cross(forward, right), forward])
+    pose[:3, :3] = looking(np.array([0.0, -0.15, 0.2]) - place)
     pose[:3, 3] = -pose[:3, :3] @ place
     matrix = np.array([[600.0, 0.0, 319.5], [0.0, 600.0, 239.5], [0.0, 0.0, 1.0]])
     return CalibratedCamera(name, 640, 480, matrix, np.zeros(0), pose)

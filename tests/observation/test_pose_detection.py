@@ -11,7 +11,7 @@ EMPTY = np.full((240, 320, 3), 90, np.uint8)
 
 
 class ScriptedNetwork:
-    """Detects what a test says."""
+    """Detects what a test sets."""
 
     def __init__(self):
         self.others = False

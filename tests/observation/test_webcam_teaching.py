@@ -1,4 +1,4 @@
-"""A simulated person teaches by touching positions; the set, and what the person is told."""
+"""A simulated person teaches by touching positions; the set, and the prompts to the person."""
 
 import numpy as np
 import pytest

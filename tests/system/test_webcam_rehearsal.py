@@ -1,4 +1,4 @@
-"""What the tutorial on a webcam tells a person to type, from files instead of a camera: from nothing to the ball.
+"""What a person types by the tutorial on a webcam, from files instead of a camera: from nothing to the ball.
 
 The board and the pointing arm are drawn as the camera would see them; the key points of the person who is measured
 are simulated at the measured noise, since no pose network finds a person in a drawing.

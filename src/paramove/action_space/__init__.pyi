@@ -16,6 +16,7 @@ from .setup import Person as Person
 from .setup import TrackingSetup as TrackingSetup
 from .setup import measured_person as measured_person
 from .setup import read_person as read_person
+from .setup import write_person as write_person
 from .target_detection import DetectedTarget as DetectedTarget
 from .target_detection import DetectionOptions as DetectionOptions
 from .track_health import HealthOptions as HealthOptions

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from ruamel.yaml import YAML
 
 from paramove.action_space.grammar import Grammar
 from paramove.action_space.grammar_file import read_grammar
@@ -19,7 +20,7 @@ from paramove.action_space.training import table_action
 from paramove.action_space.video_tracker import VideoTracker
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
 from paramove.cameras import measured_cameras, measured_file
-from paramove.documents import InputError, read_document
+from paramove.documents import InputError, read_document, replacing
 from paramove.observation import ArmObserver, ArmSizes
 from paramove.phmm import ParametricHMM, PolynomialPHMM
 
@@ -67,6 +68,15 @@ def read_person(path: Path) -> Person:
     except ValidationError as error:
         errors = "; ".join(f"{'.'.join(map(str, one['loc'])) or 'file'}: {one['msg']}" for one in error.errors())
         raise InputError(f"{path}: {errors}; expected for example {example}") from error
+
+
+def write_person(path: Path, person: Person, decimals: int = 3) -> None:
+    """Writes the file that `read_person` reads, rounded to so many decimals of a metre. Raises OSError."""
+    content: dict[str, object] = {"shoulder": [round(float(value), decimals) for value in person.shoulder]}
+    for name in ("upper_arm", "forearm", "hand"):
+        content[name] = round(float(getattr(person, name)), decimals)
+    with replacing(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
+        YAML().dump(content, file)
 
 
 def measured_person(run_folder: Path, path: Path | None) -> Person:

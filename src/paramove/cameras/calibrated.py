@@ -104,6 +104,19 @@ class CalibratedCamera:
         captured, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), self.matrix, self.distortion)
         return cast(Floats, captured.reshape(ideal.shape))
 
+    def normalised(self, pixels: ArrayLike) -> Floats:
+        """Ray directions (x/z, y/z) in the camera frame of points (..., 2), px of the image as captured; NaN stays."""
+        captured = np.asarray(pixels, dtype=np.float64)
+        result = np.full_like(captured, np.nan)
+        known = np.isfinite(captured).all(axis=-1)
+        if known.any():
+            criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-10)
+            lens: Any = self.distortion if len(self.distortion) else np.zeros(4)
+            straight, same = np.eye(3), np.eye(3)
+            ideal = cv2.undistortPointsIter(captured[known][:, None], self.matrix, lens, straight, same, criteria)
+            result[known] = ideal.reshape(-1, 2)
+        return result
+
     def undistort(self, image: Image) -> Image:
         """The image (H, W) or (H, W, C) with the lens distortion removed; the camera matrix is the same."""
         if image.shape[:2] != (self.height_px, self.width_px):

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -90,7 +88,7 @@ class StereoRig:
         detected = np.asarray(pixels, dtype=np.float64)
         if detected.ndim != 3 or detected.shape[0] != len(self.cameras) or detected.shape[2] != 2:
             raise StereoError(f"image points of shape {detected.shape} found, ({len(self.cameras)}, N, 2) expected")
-        rays = np.stack([_normalised(camera, points) for camera, points in zip(self.cameras, detected, strict=True)])
+        rays = np.stack([camera.normalised(points) for camera, points in zip(self.cameras, detected, strict=True)])
         focal = np.array([np.diag(camera.matrix)[:2] for camera in self.cameras])
         used = np.asarray(np.isfinite(rays).all(axis=2))  # [K, N]
         points = self._linear(np.nan_to_num(rays), used)
@@ -139,19 +137,6 @@ class StereoRig:
         cosines = np.einsum("kni,mni->kmn", towards, towards)
         both = used[:, None] & used[None]
         return np.asarray(np.rad2deg(np.arccos(np.clip(np.where(both, cosines, 1.0), -1.0, 1.0)).max(axis=(0, 1))))
-
-
-def _normalised(camera: CalibratedCamera, pixels: Floats) -> Floats:
-    """Ray directions (x/z, y/z) in the camera frame of image points (N, 2), px, with the distortion removed."""
-    result = np.full_like(pixels, np.nan)
-    known = np.isfinite(pixels).all(axis=1)
-    if known.any():
-        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-10)
-        lens: Any = camera.distortion if len(camera.distortion) else np.zeros(4)
-        straight, same = np.eye(3), np.eye(3)
-        ideal = cv2.undistortPointsIter(pixels[known][:, None], camera.matrix, lens, straight, same, criteria)
-        result[known] = ideal.reshape(-1, 2)
-    return result
 
 
 def _solved(matrices: Floats, right: Floats) -> Floats:

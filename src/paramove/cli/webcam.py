@@ -14,7 +14,7 @@ from paramove.documents import exit_codes, printable
 if TYPE_CHECKING:
     from paramove.cameras import CalibratedCamera
     from paramove.documents import Image
-    from paramove.observation import BodyKeyPoints, MeasuredArm
+    from paramove.observation import BodyKeyPoints
 
 app = typer.Typer(name="webcam", no_args_is_help=True, help="Track a person with a webcam.")
 
@@ -75,11 +75,11 @@ def look(
     from paramove.cameras import CalibratedCamera
     from paramove.cli.calibrate import pixels
     from paramove.documents import InputError
-    from paramove.observation import stored_network
+    from paramove.observation import checked_networks
 
     try:
         width, height = pixels(size)
-        stored_network()
+        checked_networks()
         camera = CalibratedCamera("webcam", width, height, np.diag([width, width, 1.0]), np.zeros(0), np.eye(4))
         latest_s = -1.0
         for _, captured_ns, points in seen_by([camera], [source]):
@@ -121,10 +121,11 @@ def person(
     Exit codes: 0 written; 1 the images ended before; 66 no calibration, pose network or camera; 77 not allowed to
     write; 78 a wrong length, a damaged network, or images of no use.
     """
+    from paramove.action_space import Person, write_person
     from paramove.cameras import measured_cameras
     from paramove.cli.calibrate import length
     from paramove.documents import InputError
-    from paramove.observation import PersonSetUp, stored_network
+    from paramove.observation import PersonSetUp, checked_networks
 
     try:
         camera = measured_cameras(Path(), cameras)[0]
@@ -132,7 +133,7 @@ def person(
         tall = None if height is None else length(height, "--height")
         images = None if source.startswith("recording:") else _images(camera, source)
         if images is not None:
-            stored_network()
+            checked_networks()
         if square is not None:
             far = _at_chest(camera, images, length(square, "--square"))
         set_up = PersonSetUp(camera, distance=far, height=tall)
@@ -148,7 +149,9 @@ def person(
                 break
         if set_up.arm is None:
             raise ended("the images ended before the person was measured", exit_codes.FAILURE)
-        _write(out, set_up.arm)
+        arm = set_up.arm
+        sizes = {"upper_arm": arm.upper_arm, "forearm": arm.forearm, "hand": arm.hand}
+        write_person(out, Person(shoulder=tuple(arm.shoulder), **sizes))
     except InputError as error:
         raise ended(str(error), error.exit_code) from error
     except OSError as error:
@@ -186,17 +189,6 @@ def _at_chest(
     far = float(np.median(depths)) + CHEST_M
     typer.echo(f"your shoulder is {far:.2f} m from the camera; put the board away")
     return far
-
-
-def _write(path: Path, arm: MeasuredArm) -> None:
-    from ruamel.yaml import YAML
-
-    from paramove.documents import replacing
-
-    measures = {name: round(getattr(arm, name), 3) for name in ("upper_arm", "forearm", "hand")}
-    content = {"shoulder": [round(float(value), 3) for value in arm.shoulder], **measures}
-    with replacing(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
-        YAML().dump(content, file)
 
 
 def seen_by(

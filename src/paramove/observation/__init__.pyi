@@ -26,6 +26,7 @@ from .markers import BodyTrackerOptions as BodyTrackerOptions
 from .markers import StereoBodyTracker as StereoBodyTracker
 from .network_files import HEAVY as HEAVY
 from .network_files import USUAL as USUAL
+from .network_files import checked_networks as checked_networks
 from .network_files import fetch_networks as fetch_networks
 from .network_files import has_heavy as has_heavy
 from .network_files import stored_network as stored_network

@@ -114,11 +114,11 @@ def _see(
     detected: BodyKeyPoints, model: float,
 ) -> int:  # fmt: skip
     """Adds the key points of an image, of the side that is the likelier one; that side."""
-    side = int(comparing.hypotheses(arm[None], camera, detected, model)[:, 0].argmax())
+    own, total = comparing.densities(arm[None], camera, detected, model)
+    side = int(comparing.hypotheses(total)[:, 0].argmax())
     if side >= len(SIDES):
         return side
-    own, total = comparing.densities(arm[None], camera, detected, side, model)
-    weights = np.exp(own - total)[0]
+    weights = np.exp(own - total)[side, 0]
     turn = camera.camera_from_world[:3, :3]
     local = arm @ turn.T + camera.camera_from_world[:3, 3]
     scale = np.diag(camera.matrix)[:2]
@@ -243,5 +243,5 @@ def _along_rays(camera: CalibratedCamera, detected: BodyKeyPoints | None, should
     turn, shift = camera.camera_from_world[:3, :3], camera.camera_from_world[:3, 3]
     away = float((turn @ shoulder + shift)[2])
     depth = away + detected.depths_at(away, camera.matrix[0, 0])[0]
-    rays = np.column_stack([detected.positions[0], np.ones(POINTS)]) @ np.linalg.inv(camera.matrix).T
+    rays = np.column_stack([camera.normalised(detected.positions[0]), np.ones(POINTS)])
     return np.asarray((depth[:, None] * rays - shift) @ turn)

@@ -113,7 +113,8 @@ class KeyPointObserver:
         if usable.any():
             arm = self._arm_points(fitted[usable])
             for camera, points in self._detected():
-                result[usable] += np.logaddexp.reduce(self.hypotheses(arm, camera, points, self.options.model), axis=0)
+                _, total = self.densities(arm, camera, points, self.options.model)
+                result[usable] += np.logaddexp.reduce(self.hypotheses(total), axis=0)
         return result
 
     def detects(self, pose: ArrayLike) -> bool:
@@ -122,8 +123,8 @@ class KeyPointObserver:
         if not np.isfinite(one).all():
             return False
         arm = self._arm_points(one[None])
-        return any(int(self.hypotheses(arm, *view, self.options.across)[:, 0].argmax()) < len(SIDES)
-                   for view in self._detected())  # fmt: skip
+        totals = (self.densities(arm, *view, self.options.across)[1] for view in self._detected())
+        return any(int(self.hypotheses(total)[:, 0].argmax()) < len(SIDES) for total in totals)
 
     def corrected(self, pose: ArrayLike) -> Floats:
         """The posture (D,), m, in the world, moved to where the key points are; lengths may be off by some cm.
@@ -138,14 +139,14 @@ class KeyPointObserver:
         arm = self._arm_points(before[None])
         precision, towards = self._prior(before, [camera for camera, _ in detected]), np.zeros(len(before))
         for camera, points in detected:
-            hypotheses = self.hypotheses(arm, camera, points, self.options.across)[:, 0]
-            hypothesis = int(hypotheses.argmax())
+            own, total = self.densities(arm, camera, points, self.options.across)
+            hypothesis = int(self.hypotheses(total)[:, 0].argmax())
             if hypothesis >= len(SIDES):
                 continue
             slopes, projected = self._slopes(before, camera)
-            bent_px = self._model_px(arm, camera, 0.0)[0]
-            own, total = self.densities(arm, camera, points, hypothesis, self.options.across)
-            inlier = np.exp(own - total)[0]
+            ahead = arm[0] @ camera.camera_from_world[2, :3] + camera.camera_from_world[2, 3]
+            bent_px = self._model_px(ahead, camera, 0.0)
+            inlier = np.exp(own - total)[hypothesis, 0]
             for point in np.flatnonzero(inlier > MIN_INLIER):
                 weight = inlier[point] / (points.deviations[hypothesis, point] ** 2 + bent_px[point] ** 2)
                 precision += weight * slopes[point].T @ slopes[point]
@@ -163,34 +164,36 @@ class KeyPointObserver:
         wrist = points[:, 3] if points.shape[1] == 4 else (1.0 - fraction) * elbow + fraction * tip
         return np.stack([shoulder, elbow, wrist, 0.5 * (wrist + tip)], axis=1)
 
-    def hypotheses(self, arm: Floats, camera: CalibratedCamera, points: BodyKeyPoints, model: float) -> Floats:
-        """ln p of the points of the right arm being its own, those of the left one, or none of the arm; (3, M)."""
-        sides = [self.densities(arm, camera, points, side, model)[1].sum(axis=1) for side in range(len(SIDES))]
-        nothing = np.full(len(arm), len(ARM_POINTS) * ELSEWHERE)
-        return np.stack([*sides, nothing]) + self.options.weights[:, None]
+    def hypotheses(self, total: Floats) -> Floats:
+        """ln p of the points of the right arm being its own, those of the left one, or none of the arm; (3, M).
+
+        `total`: densities of each point as any, of `densities`.
+        """
+        nothing = np.full((1, total.shape[1]), len(ARM_POINTS) * ELSEWHERE)
+        return np.asarray(np.concatenate([total.sum(axis=2), nothing]) + self.options.weights[:, None])
 
     def densities(
-        self, arm: Floats, camera: CalibratedCamera, points: BodyKeyPoints, side: int, model: float
+        self, arm: Floats, camera: CalibratedCamera, points: BodyKeyPoints, model: float
     ) -> tuple[Floats, Floats]:
-        """ln of the density of each point of one side, as a point of the arm and as any; (M, 4), of squared deviations.
+        """ln of the density of each point, as a point of the arm and as any; (2, M, 4) by side, of squared deviations.
 
         An unknown point is no point of the arm.
         """
         ahead = arm @ camera.camera_from_world[2, :3] + camera.camera_from_world[2, 3]
+        deviations, positions = points.deviations[:, None], points.positions[:, None]
         with np.errstate(invalid="ignore", divide="ignore"):
-            widened = 1.0 + (self._model_px(arm, camera, model) / points.deviations[side]) ** 2
-            squared = ((camera.project(arm) - points.positions[side]) ** 2).sum(axis=2) / points.deviations[side] ** 2
-            depths = points.depths_at(ahead[:, 0], camera.matrix[0, 0])[:, side]
+            widened = 1.0 + (self._model_px(ahead, camera, model) / deviations) ** 2
+            squared = ((camera.project(arm) - positions) ** 2).sum(axis=3) / deviations**2
+            depths = np.moveaxis(points.depths_at(ahead[:, 0], camera.matrix[0, 0]), 1, 0)
             behind = (ahead - ahead[:, :1] - depths) / self.options.depths
             own = -0.5 * squared / widened - np.log(2.0 * np.pi * widened) - 0.5 * np.nan_to_num(behind) ** 2
         own = np.where(np.isfinite(own) & (ahead > 0.0), own, -np.inf) + np.log1p(-self.options.outlier)
         total = np.logaddexp(own, np.log(self.options.outlier) + ELSEWHERE)
-        known = np.isfinite(points.positions[side, :, 0])
+        known = np.isfinite(positions[..., 0])
         return np.where(known, own, -np.inf), np.where(known, total, ELSEWHERE)
 
-    def _model_px(self, arm: Floats, camera: CalibratedCamera, model: float) -> Floats:
-        """Deviation of each point of a good posture from the arm, (M, 4), px; a wrist without a place is in line."""
-        ahead = arm @ camera.camera_from_world[2, :3] + camera.camera_from_world[2, 3]
+    def _model_px(self, ahead: Floats, camera: CalibratedCamera, model: float) -> Floats:
+        """Deviation of each point of a good posture from the arm, px, at these depths (M, 4), m; a wrist is in line."""
         off: Floats = np.hypot(model, [0.0, 0.0, self.options.wrist, 0.0]) * camera.matrix[0, 0] / ahead
         return off
 

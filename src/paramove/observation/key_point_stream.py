@@ -9,7 +9,6 @@ from pathlib import Path
 from paramove.cameras import CalibratedCamera, EndOfFrames, FrameError, open_source
 from paramove.documents import Image, InputError
 from paramove.observation.body_key_points import BodyKeyPoints, key_points_from
-from paramove.observation.network_files import stored_network
 from paramove.observation.pose_detection import PoseDetection
 from paramove.recording import read
 
@@ -93,8 +92,9 @@ def detected_key_points(
 
     Raises InputError without the pose network.
     """
-    stored_network(offline=offline)
     detection, reported = PoseDetection(offline=offline), ""
+    if detection.missing is not None:
+        raise detection.missing
     for camera, captured_ns, image in images:
         points = detection.detect(camera.name, image)
         if points is not None:

@@ -80,11 +80,16 @@ def stored_network(folder: Path | None = None, *, offline: bool = False) -> Pose
 
     Raises InputError if a file is missing or damaged.
     """
+    return PoseNetwork(*checked_networks(folder, offline=offline))
+
+
+def checked_networks(folder: Path | None = None, *, offline: bool = False) -> tuple[Path, Path]:
+    """The files of body and hand that `stored_network` loads. Raises InputError if one is missing or damaged."""
     folder = default_folder() if folder is None else folder
     pose, hand = _checked(folder, USUAL)
     if offline and has_heavy(folder):
         (pose,) = _checked(folder, HEAVY)
-    return PoseNetwork(pose, hand)
+    return pose, hand
 
 
 def has_heavy(folder: Path | None = None) -> bool:

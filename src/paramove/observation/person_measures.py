@@ -77,7 +77,7 @@ def measured_arm(
             "head, shoulders and the whole arm, and move it for some seconds"
         )
     detected = [one for one, good in zip(key_points, whole, strict=True) if good]
-    rays = _rays(camera, arms[whole])
+    rays = np.concatenate([camera.normalised(arms[whole]), np.ones((whole.sum(), len(ARM_POINTS), 1))], axis=2)
     usual = np.array([UPPER_ARM_OF_HEIGHT, FOREARM_OF_HEIGHT]) * (MEAN_HEIGHT_M if height is None else height)
     if distance is not None:
         deviation, along = DISTANCE_SD / distance, distance
@@ -110,12 +110,6 @@ def check_scale(distance: float | None, height: float | None) -> None:
     for name, value, (low, high) in (("distance", distance, (0.3, 10.0)), ("height", height, (0.8, 2.5))):
         if value is not None and not low <= value <= high:
             raise InputError(f"expected a {name} of {low:g} to {high:g} m, found {value:g} m")
-
-
-def _rays(camera: CalibratedCamera, pixels: Floats) -> Floats:
-    """Points at a depth of 1 m, (N, 4, 3), in the camera's frame; the lens's distortion is left out."""
-    flat = np.concatenate([pixels, np.ones((*pixels.shape[:2], 1))], axis=2)
-    return np.asarray(flat @ np.linalg.inv(camera.matrix).T)
 
 
 def _points(camera: CalibratedCamera, detected: Sequence[BodyKeyPoints], rays: Floats, along: float) -> Floats:

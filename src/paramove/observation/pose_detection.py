@@ -64,22 +64,25 @@ class PoseDetection:
         networks: Folder of the networks, by default that of the user's cache.
         offline: See `stored_network`.
 
+    Attributes:
+        missing: Why there are no networks; None if there are.
+
     Without the networks nothing is detected, and `trouble` gives the reason.
     """
 
     def __init__(self, networks: Path | None = None, *, offline: bool = False) -> None:
         self._folder, self._offline = networks, offline
         self._views: dict[str, _View] = {}
-        self._missing = ""
+        self.missing: InputError | None = None
         self._unused: PoseNetwork | None = None
         try:
             self._unused = stored_network(networks, offline=offline)
         except InputError as error:
-            self._missing = f"{error}. Until then the arm is tracked by its outline alone"
+            self.missing = error
 
     def detect(self, camera: str, image: Image) -> BodyKeyPoints | None:
         """Of an image (H, W, 3), BGR; None without the networks."""
-        if self._missing:
+        if self.missing:
             return None
         if camera not in self._views:
             self._views[camera] = _View(self._unused or stored_network(self._folder, offline=self._offline))
@@ -90,4 +93,6 @@ class PoseDetection:
     def trouble(self) -> str:
         """What a person can do about the pictures, by camera; "" if nothing is wrong."""
         troubles = [f"{camera}: {view.trouble}" for camera, view in self._views.items() if view.trouble]
-        return self._missing or "; ".join(troubles)
+        if self.missing:
+            return f"{self.missing}. Until then the arm is tracked by its outline alone"
+        return "; ".join(troubles)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.documents import Floats, Image, InputError
-from paramove.observation.body_key_points import ARM_POINTS, BodyKeyPoints
+from paramove.observation.body_key_points import BodyKeyPoints
 
 POSE_PX, HAND_PX = 256, 224
 """Side of the square picture that each network takes."""
@@ -232,6 +232,3 @@ def _outputs(network: cv2.dnn.Net, picture: Floats, names: tuple[str, ...]) -> t
 
 def _sigmoid(values: Floats) -> Floats:
     return np.asarray(1.0 / (1.0 + np.exp(-values)))
-
-
-assert NOISE_PX.shape == (len(ARM_POINTS),)

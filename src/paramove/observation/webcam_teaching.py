@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -137,8 +138,11 @@ class WebcamTeacher:
     def _reconstructed(self, track: Sequence[_Detected], target: Floats) -> ArmMovement:
         times = np.array([one.at_ns - track[0].at_ns for one in track]) * 1e-9
         points = [[one.points[number] for one in track] for number in range(len(self._cameras))]
-        known = {"sizes": self._sizes, "shoulder": self._shoulder, "hangs_until_s": 0.5 * STILL_S}
-        free = reconstructed(self._cameras, times, points, **known)  # type: ignore[arg-type]
+        known = partial(
+            reconstructed, self._cameras, times, points, sizes=self._sizes, shoulder=self._shoulder,
+            hangs_until_s=0.5 * STILL_S,
+        )  # fmt: skip
+        free = known()
         strange = float((free.sides == 2).mean())
         if strange > MAX_STRANGE:
             raise InputError(f"{100.0 * strange:.0f} % of the images show something else than the arm")
@@ -148,7 +152,7 @@ class WebcamTeacher:
                 f"the fingertip ends {100.0 * off:.0f} cm from the position, as detected: was it another one?"
             )
         touched = target, times[-1] - TOUCH_S
-        return reconstructed(self._cameras, times, points, touched=touched, **known)  # type: ignore[arg-type]
+        return known(touched=touched)
 
     def _ask(self, number: int) -> None:
         self._done = number
