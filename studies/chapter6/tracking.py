@@ -92,7 +92,7 @@ class Follower:
             "times_s": [round(one.time_s, 4) for one in estimates],
             "poses": _lengths([one.pose[:9] for one in estimates]),
             "best_hands": _lengths([one.pose_best[HAND] for one in estimates]),
-            "hand_deviations": _lengths([np.sqrt(np.diagonal(one.hand_covariance)) for one in estimates]),
+            "hand_deviations": _lengths([np.sqrt(np.diagonal(one.covariance)[HAND]) for one in estimates]),
             "effective": [round(one.effective_sample_size, 1) for one in estimates],
             "lost": [int(one.lost) for one in estimates],
             "actions": {name: np.round(posterior[:, i], 4).tolist() for i, name in enumerate(names)},

@@ -6,8 +6,8 @@ import pytest
 from paramove.action_space.estimates import (
     action_probabilities,
     best_pose,
-    hand_covariance,
     mean_pose,
+    pose_covariance,
     refined_pose,
     tau_histogram,
     theta_estimate,
@@ -87,7 +87,7 @@ def test_refined_pose_stays_at_its_mode():
     np.testing.assert_allclose(found, near.mean(axis=0), atol=1e-3)
 
 
-def test_hand_covariance_is_that_of_the_last_point(particles):
-    found = hand_covariance(particles["poses"], particles["weights"])
-    direct = np.cov(particles["poses"][:, 6:].T, aweights=particles["weights"], bias=True)
+def test_pose_covariance_is_weighted(particles):
+    found = pose_covariance(particles["poses"], particles["weights"])
+    direct = np.cov(particles["poses"].T, aweights=particles["weights"], bias=True)
     np.testing.assert_allclose(found, direct, rtol=1e-9)

@@ -11,6 +11,7 @@ from paramove.action_space.tracker import ActionTracker, TrackerOptions
 from paramove.action_space.vocabulary import Vocabulary
 from paramove.demonstrations import table_place
 from paramove.documents.input_error import InputError
+from paramove.observation import HAND
 from tests.action_space.performances import arm_poses, gaussian, performed
 
 PLACES = np.array([[0.25, 0.7], [0.8, 0.3]])
@@ -62,7 +63,7 @@ def test_estimates_are_complete_and_consistent(pointing):
     assert estimate.contact > 0.9
     assert 1.0 <= estimate.effective_sample_size <= 400.0
     assert estimate.theta["pointing"].deviation < 0.1
-    assert np.linalg.eigvalsh(estimate.hand_covariance).min() >= 0.0
+    assert np.linalg.eigvalsh(estimate.covariance).min() >= -1e-12
     assert np.isfinite(estimate.log_likelihood)
     np.testing.assert_allclose(estimate.targets["pointing"], table_place(estimate.theta["pointing"].mean))
 
@@ -123,7 +124,7 @@ def test_without_a_view_the_pose_is_predicted_and_becomes_less_certain(pointing,
         assert estimate.degraded
         assert np.isfinite(estimate.pose).all()
     assert "no usable view for 0.4 s" in estimate.detail
-    assert np.trace(estimate.hand_covariance) > 1.5 * np.trace(before.hand_covariance)
+    assert np.trace(estimate.covariance[HAND, HAND]) > 1.5 * np.trace(before.covariance[HAND, HAND])
     # It moves on by itself: nearer to where the hand is by then than to where it was.
     now = poses[np.searchsorted(times, estimate.time_s) - 1, -3:]
     assert np.linalg.norm(estimate.pose[-3:] - now) < np.linalg.norm(before.pose[-3:] - now)

@@ -52,6 +52,17 @@ def test_one_camera_with_measures(poses):
     np.testing.assert_allclose(found.lengths[:, 0], SIZES.upper_arm, rtol=0.0, atol=0.03)
 
 
+def test_a_constant_error_of_depths_is_found(poses):
+    """Where the hand is at the end is known, and where it hangs at the start."""
+    at, tracks = times(poses)[-1] - 0.3, shown(poses, 1)
+    known = {"sizes": SIZES, "shoulder": RESTING_SHOULDER, "touched": (TARGET, at), "hangs_until_s": 0.5}
+    clean = reconstructed(cameras(1), times(poses), tracks, **known)
+    for one in tracks[0]:
+        one.depths[:, 1:] += 0.15
+    found = reconstructed(cameras(1), times(poses), tracks, **known)
+    assert np.median(np.linalg.norm(found.fingertip - clean.fingertip, axis=1)) < 0.06, "of 15 cm"
+
+
 def test_exchanged_sides_are_found(poses):
     tracks = shown(poses, 2)
     clean = reconstructed(cameras(2), times(poses), tracks)

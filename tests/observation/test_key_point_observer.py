@@ -113,6 +113,18 @@ def test_a_single_outlier_hardly_moves_the_arm(point):
     np.testing.assert_allclose(comparing.corrected(pose), pose, rtol=0.0, atol=0.01)
 
 
+def test_an_unsure_filter_is_corrected_by_more():
+    """The hand jumped by 40 px: outliers, unless the hypotheses are as far apart."""
+    comparing, pose = observer(), some_poses(1)[0]
+    true = pose + np.repeat([0.0, 0.0, 1.0], 3) * np.tile([0.0, 0.2, 0.22], 3)
+    comparing.look([seen(true, CAMERAS[0])])
+    unsure = np.diag(np.repeat([0.0, 0.02, 0.15], 3) ** 2)
+    kept, moved = comparing.corrected(pose), comparing.corrected(pose, unsure)
+    pixels = CAMERAS[0].project(np.stack([one[6:9] for one in (true, kept, moved)]))
+    assert np.linalg.norm(pixels[1] - pixels[0]) > 20.0
+    assert np.linalg.norm(pixels[2] - pixels[0]) < 5.0
+
+
 @pytest.mark.parametrize("views", [1, 2])
 def test_the_corrected_posture_is_where_it_is_seen(views):
     rng = np.random.default_rng(2)

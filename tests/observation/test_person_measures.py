@@ -34,6 +34,16 @@ def test_lengths_and_shoulder_follow_from_the_distance(poses):
     assert found.resting[8] < RESTING_SHOULDER[2] - 0.4, "the arm hangs"
 
 
+def test_a_resting_arm_hangs_whatever_the_network_s_depth(poses):
+    points, exact = seen(poses), measured_arm(CAMERA, seen(poses), distance=DISTANCE).resting
+    for one in points:
+        one.depths[0, 1] += 0.08
+        one.depths[0, 2:] += 0.16
+    resting = measured_arm(CAMERA, points, distance=DISTANCE).resting
+    assert np.linalg.norm(resting[3:6] - exact[3:6]) < 0.04, "of 8 cm"
+    assert np.linalg.norm(resting[6:9] - exact[6:9]) < 0.12, "of 16 cm"
+
+
 def test_a_taller_person_is_farther_away(poses):
     near, far = (measured_arm(CAMERA, seen(poses), height=height) for height in (1.6, 1.9))
     ratio = np.linalg.norm(far.shoulder - CAMERA.position) / np.linalg.norm(near.shoulder - CAMERA.position)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramove.documents import Floats, Ints
-from paramove.observation import HAND
 
 KERNEL_WIDTHS = (0.15, 0.10, 0.05)
 """sigma_1 to sigma_3 of (6.19), m."""
@@ -80,6 +79,6 @@ def refined_pose(poses: Floats, weights: Floats, first: Floats, widths: tuple[fl
     return np.asarray(pose)
 
 
-def hand_covariance(poses: Floats, weights: Floats) -> Floats:
-    """Covariance of the hand's position, m^2. Shape (3, 3)."""
-    return theta_estimate(poses[:, HAND], weights).covariance
+def pose_covariance(poses: Floats, weights: Floats) -> Floats:
+    """Covariance of the poses, m^2. Shape (D, D)."""
+    return theta_estimate(poses, weights).covariance

@@ -102,7 +102,7 @@ def estimate_message(
         lost=estimate.lost,
         degraded=estimate.degraded,
         detail=estimate.detail,
-        hand=_location(estimate.pose[HAND], np.sqrt(np.diagonal(estimate.hand_covariance)), table),
+        hand=_location(estimate.pose[HAND], np.sqrt(np.diagonal(estimate.covariance)[HAND]), table),
         pointed=_location(state.pointed, state.pointed_deviation, table),
     )
     message.captured.FromNanoseconds(state.captured_ns)

@@ -13,8 +13,8 @@ from paramove.action_space.estimates import (
     ThetaEstimate,
     action_probabilities,
     best_pose,
-    hand_covariance,
     mean_pose,
+    pose_covariance,
     refined_pose,
     tau_histogram,
     theta_estimate,
@@ -121,7 +121,7 @@ class TrackEstimate:
         targets: target of the mean parameters of each action that has particles, (3,).
         tau_histogram: posterior over progress, all bins sum to 1; one row an action, in the order of `actions`.
         pose: refined (6.18), (D,). pose_best: (6.16), (D,).
-        hand_covariance: of the hand's position, m^2, (3, 3).
+        covariance: of the pose, m^2, (D, D).
         effective_sample_size: effective number of particles.
         temper: exponent of the likelihood; below 1 it was flattened.
         log_likelihood: of the best particle, nats; NaN without a usable view.
@@ -138,7 +138,7 @@ class TrackEstimate:
     tau_histogram: Floats
     pose: Floats
     pose_best: Floats
-    hand_covariance: Floats
+    covariance: Floats
     effective_sample_size: float
     temper: float
     log_likelihood: float
@@ -271,7 +271,7 @@ class ActionTracker:
             ),
             pose=placement.in_world(refined_pose(particles.poses, particles.weights, best, widths)),
             pose_best=placement.in_world(best),
-            hand_covariance=placement.scale**2 * hand_covariance(particles.poses, particles.weights),
+            covariance=placement.scale**2 * pose_covariance(particles.poses, particles.weights),
             effective_sample_size=effective_number(particles.weights),
             temper=1.0 if measured is None else measured.temper,
             log_likelihood=float("nan") if measured is None else measured.best,

@@ -170,7 +170,7 @@ class VideoTracker:
         time_s = (views.captured_ns - self._started_ns) * 1e-9
         elapsed_s = _since_last(self._tracker, time_s)
         estimate = self._tracker.update(time_s, self._log_likelihoods, self._presence)
-        estimate = replace(estimate, pose=self._key_points.corrected(estimate.pose))
+        estimate = replace(estimate, pose=self._key_points.corrected(estimate.pose, estimate.covariance))
         self._uncertainty = estimate.detail
         first = next(iter(self._cameras.values()))
         theta, target = estimate.theta[estimate.action], estimate.target

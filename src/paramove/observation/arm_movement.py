@@ -1,8 +1,9 @@
 """The whole movement of an arm from the key points of one or several cameras: for recordings that teach.
 
 The most probable path of shoulder, elbow, wrist and hand given all images at once: a smooth one (white acceleration),
-detected with the network's noise, exchanged sides and outliers, with bones of constant length if they are known, and
-with the fingertip at a known position at the end if it touches one. Gauss-Newton steps on a banded system.
+detected with the network's noise, its depths with a constant error, exchanged sides and outliers, with bones of
+constant length if they are known, and with the fingertip at a known position at the end if it touches one. Gauss-Newton
+steps on a banded system.
 """
 
 from __future__ import annotations
@@ -86,13 +87,16 @@ def reconstructed(
     rest = None if shoulder is None else np.asarray(shoulder, dtype=np.float64)
     points = _first_guess(cameras, key_points, sizes or ArmSizes(), rest)
     sides = np.full((len(cameras), len(times)), -1)
+    too_deep = np.zeros((len(cameras), POINTS))
     for step in range(STEPS):
         model = max(FINE_M, COARSE_M * 0.5**step)
         system = _System(times)
         for number, camera in enumerate(cameras):
             for frame, detected in enumerate(key_points[number]):
                 if detected is not None and detected.has_person:
-                    sides[number, frame] = _see(system, comparing, camera, frame, points[frame], detected, model)
+                    seen = (frame, points[frame], detected, model, too_deep[number])
+                    sides[number, frame] = _see(system, comparing, camera, *seen)
+            too_deep[number] = _depth_errors(camera, points, key_points[number], sides[number])
         if sizes is not None:
             for bone, length in enumerate((sizes.upper_arm, sizes.forearm, 0.5 * sizes.hand)):
                 system.add_length(points, bone, length)
@@ -111,9 +115,12 @@ def reconstructed(
 
 def _see(
     system: _System, comparing: KeyPointObserver, camera: CalibratedCamera, frame: int, arm: Floats,
-    detected: BodyKeyPoints, model: float,
+    detected: BodyKeyPoints, model: float, too_deep: Floats,
 ) -> int:  # fmt: skip
-    """Adds the key points of an image, of the side that is the likelier one; that side."""
+    """Adds the key points of an image, of the side that is the likelier one; that side.
+
+    `too_deep`: constant error of the depths of each point, (4,), m.
+    """
     own, total = comparing.densities(arm[None], camera, detected, model)
     side = int(comparing.hypotheses(total)[:, 0].argmax())
     if side >= len(SIDES):
@@ -136,9 +143,26 @@ def _see(
         if np.isfinite(deviation) and np.isfinite(depth):
             row = np.zeros((1, DIMENSIONS))
             row[0, 3 * point : 3 * point + 3], row[0, :3] = turn[2], -turn[2]
-            behind = depth - (z - local[SHOULDER, 2])
+            behind = depth - too_deep[point] - (z - local[SHOULDER, 2])
             system.add(frame, row, np.array([behind]), weights[point] / deviation**2)
     return side
+
+
+def _depth_errors(
+    camera: CalibratedCamera, points: Floats, detected: Sequence[BodyKeyPoints | None], sides: Ints
+) -> Floats:
+    """By how much a camera's points are detected too far behind the shoulder in the whole movement, (4,), m.
+
+    The most probable constant error, which is as large as those of single images.
+    """
+    ahead = (points @ camera.camera_from_world[2, :3]) + camera.camera_from_world[2, 3]
+    behind = ahead - ahead[:, :1]
+    off = [
+        one.depths_at(at[SHOULDER], camera.matrix[0, 0])[side] - found
+        for one, side, at, found in zip(detected, sides, ahead, behind, strict=True)
+        if one is not None and 0 <= side < len(SIDES)
+    ]
+    return np.asarray(np.nansum(off, axis=0) / (len(off) + 1.0)) if off else np.zeros(POINTS)
 
 
 class _System:

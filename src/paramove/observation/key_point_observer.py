@@ -126,25 +126,30 @@ class KeyPointObserver:
         totals = (self.densities(arm, *view, self.options.across)[1] for view in self._detected())
         return any(int(self.hypotheses(total)[:, 0].argmax()) < len(SIDES) for total in totals)
 
-    def corrected(self, pose: ArrayLike) -> Floats:
+    def corrected(self, pose: ArrayLike, covariance: ArrayLike | None = None) -> Floats:
         """The posture (D,), m, in the world, moved to where the key points are; lengths may be off by some cm.
 
-        The most probable posture, linearised, of one that is off by `across` and `along`. Only images whose points are
-        probably of this arm count, and of them the points that are probably no outliers.
+        The most probable posture, linearised, of one that is off by `across` and `along`, and by what the filter itself
+        is unsure of: `covariance` (D, D), m². Only images whose points are probably of this arm count, and of them the
+        points that are probably no outliers.
         """
         before = np.asarray(pose, dtype=np.float64)
         detected = self._detected()
         if not detected or not np.isfinite(before).all():
             return before
         arm = self._arm_points(before[None])
-        precision, towards = self._prior(before, [camera for camera, _ in detected]), np.zeros(len(before))
+        unsure = np.zeros((len(before), len(before))) if covariance is None else np.asarray(covariance)
+        precision = np.linalg.inv(self._off(before, [camera for camera, _ in detected]) + unsure)
+        towards = np.zeros(len(before))
         for camera, points in detected:
-            own, total = self.densities(arm, camera, points, self.options.across)
+            slopes, projected = self._slopes(before, camera)
+            ahead = arm[0] @ camera.camera_from_world[2, :3] + camera.camera_from_world[2, 3]
+            unsure_px = np.sqrt(0.5 * np.einsum("pid,de,pie->p", slopes, unsure, slopes))
+            off = np.hypot(self.options.across, unsure_px * ahead / camera.matrix[0, 0])
+            own, total = self.densities(arm, camera, points, off)
             hypothesis = int(self.hypotheses(total)[:, 0].argmax())
             if hypothesis >= len(SIDES):
                 continue
-            slopes, projected = self._slopes(before, camera)
-            ahead = arm[0] @ camera.camera_from_world[2, :3] + camera.camera_from_world[2, 3]
             bent_px = self._model_px(ahead, camera, 0.0)
             inlier = np.exp(own - total)[hypothesis, 0]
             for point in np.flatnonzero(inlier > MIN_INLIER):
@@ -173,11 +178,11 @@ class KeyPointObserver:
         return np.asarray(np.concatenate([total.sum(axis=2), nothing]) + self.options.weights[:, None])
 
     def densities(
-        self, arm: Floats, camera: CalibratedCamera, points: BodyKeyPoints, model: float
+        self, arm: Floats, camera: CalibratedCamera, points: BodyKeyPoints, model: float | Floats
     ) -> tuple[Floats, Floats]:
         """ln of the density of each point, as a point of the arm and as any; (2, M, 4) by side, of squared deviations.
 
-        An unknown point is no point of the arm.
+        An unknown point is no point of the arm. `model`: by how much the arm is off, of each point or all, m.
         """
         ahead = arm @ camera.camera_from_world[2, :3] + camera.camera_from_world[2, 3]
         deviations, positions = points.deviations[:, None], points.positions[:, None]
@@ -192,21 +197,21 @@ class KeyPointObserver:
         known = np.isfinite(positions[..., 0])
         return np.where(known, own, -np.inf), np.where(known, total, ELSEWHERE)
 
-    def _model_px(self, ahead: Floats, camera: CalibratedCamera, model: float) -> Floats:
+    def _model_px(self, ahead: Floats, camera: CalibratedCamera, model: float | Floats) -> Floats:
         """Deviation of each point of a good posture from the arm, px, at these depths (M, 4), m; a wrist is in line."""
         off: Floats = np.hypot(model, [0.0, 0.0, self.options.wrist, 0.0]) * camera.matrix[0, 0] / ahead
         return off
 
-    def _prior(self, pose: Floats, cameras: Sequence[CalibratedCamera]) -> Floats:
-        """Precision of a posture, (D, D)."""
-        precision = np.eye(len(pose)) / self.options.across**2
+    def _off(self, pose: Floats, cameras: Sequence[CalibratedCamera]) -> Floats:
+        """Covariance of a posture of the filter, beside the filter's own, (D, D), m²."""
+        covariance = np.eye(len(pose)) * self.options.across**2
         if len(cameras) == 1:
-            more = self.options.along**-2.0 - self.options.across**-2.0
+            less = self.options.along**2 - self.options.across**2
             for at in range(0, len(pose), 3):
                 ray = pose[at : at + 3] - cameras[0].position
                 ray = ray / np.linalg.norm(ray)
-                precision[at : at + 3, at : at + 3] += more * np.outer(ray, ray)
-        return precision
+                covariance[at : at + 3, at : at + 3] += less * np.outer(ray, ray)
+        return covariance
 
     def _slopes(self, pose: Floats, camera: CalibratedCamera) -> tuple[Floats, Floats]:
         """How the four points of an image follow the posture, (4, 2, D), px per m; and where they are, (4, 2)."""

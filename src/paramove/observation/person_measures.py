@@ -14,6 +14,7 @@ import numpy as np
 from paramove.cameras import CalibratedCamera
 from paramove.documents import Floats, InputError
 from paramove.observation.body_key_points import ARM_POINTS, BodyKeyPoints
+from paramove.observation.key_point_observer import KeyPointOptions
 
 MIN_IMAGES = 20
 """Of a person with the whole right arm in view."""
@@ -26,6 +27,10 @@ HAND_OF_FOREARM = 0.72
 LIMITS_M = {"upper_arm": (0.15, 0.45), "forearm": (0.15, 0.40), "hand": (0.10, 0.28)}
 MEAN_HEIGHT_M, ANY_HEIGHT_SD = 1.70, 0.06
 """Of adults, where nothing is known, and its deviation as a fraction."""
+HANGS_WITHIN = np.radians(9.0)
+"""Deviation of a resting upper arm from the vertical, to either side: of ten seated persons."""
+SEARCHED_M = np.linspace(-0.3, 0.3, 121)
+"""Errors of the network's depths that are tried."""
 RESTING_IMAGES = 9
 """The first so many images show the resting arm."""
 
@@ -96,7 +101,7 @@ def measured_arm(
                 f"the {name.replace('_', ' ')} seems to be {100.0 * lengths[name]:.0f} cm long, {100.0 * low:.0f} "
                 f"to {100.0 * high:.0f} cm expected: is the distance right, and was the whole arm in view?"
             )
-    resting = _resting(camera, _points(camera, detected, rays, along))
+    resting = _resting(camera, _points(camera, detected, rays, along), float(upper_arm), float(forearm))
     return MeasuredArm(
         **lengths,
         resting=resting,
@@ -133,8 +138,21 @@ def _distance_of(camera: CalibratedCamera, detected: Sequence[BodyKeyPoints], ra
     return low
 
 
-def _resting(camera: CalibratedCamera, points: Floats) -> Floats:
-    """Shoulder, elbow and fingertip of the first images, in the world, (9,)."""
-    first = np.median(points[:RESTING_IMAGES], axis=0)
-    in_world = (first - camera.camera_from_world[:3, 3]) @ camera.camera_from_world[:3, :3]
-    return np.concatenate([in_world[0], in_world[1], 2.0 * in_world[3] - in_world[2]])
+def _resting(camera: CalibratedCamera, points: Floats, upper_arm: float, forearm: float) -> Floats:
+    """Shoulder, elbow and fingertip of the first images, in the world, (9,).
+
+    Elbow and hand are at the most probable depths given the network's, the bones' lengths, m, and an upper arm that
+    hangs.
+    """
+    shoulder, elbow, wrist, hand = np.median(points[:RESTING_IMAGES], axis=0)
+    elbows, wrists, hands = (point * (1.0 + SEARCHED_M[:, None] / point[2]) for point in (elbow, wrist, hand))
+    upper, fore = elbows - shoulder, np.linalg.norm(wrists - elbows[:, None], axis=2)  # (E,), (E, W)
+    aside = (upper @ camera.camera_from_world[:3, :3])[:, :2]
+    options = KeyPointOptions()
+    squares = (SEARCHED_M / options.elbow_depth) ** 2
+    squares += ((np.linalg.norm(upper, axis=1) - upper_arm) / LENGTHS_SD) ** 2
+    squares += (aside**2).sum(axis=1) / (upper_arm * np.sin(HANGS_WITHIN)) ** 2
+    both = squares[:, None] + ((fore - forearm) / LENGTHS_SD) ** 2 + (SEARCHED_M / options.hand_depth) ** 2
+    best_elbow, best_hand = np.unravel_index(both.argmin(), both.shape)
+    resting = np.stack([shoulder, elbows[best_elbow], 2.0 * hands[best_hand] - wrists[best_hand]])
+    return np.asarray(((resting - camera.camera_from_world[:3, 3]) @ camera.camera_from_world[:3, :3]).ravel())
