@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import Field
 
 from paramove.bus import Bus, NodeConfig, Received, main, topics
-from paramove.dashboard import LivePicture, PageServer, StopButton, Surface, subscribe_to_nodes
+from paramove.dashboard import LivePicture, PageServer, StopButton, Surface, Texts, subscribe_to_nodes
 from paramove.robots import RobotDescription, RobotFolder
 
 PERCEPTION = (topics.CAMERA_IMAGE, topics.OBJECTS_TRACKED, topics.GESTURES, topics.CALIBRATION_PLANE)
@@ -20,17 +20,19 @@ PUBLISHES = (topics.OPERATOR_STOP,)
 
 
 class Config(NodeConfig):
-    """`port`: 0 takes a free one. `robot`: folder of its description."""
+    """`port`: 0 takes a free one. `robot`: folder of its description; null: there is none, and so no stop button."""
 
     title: str = Field("paramove", max_length=80)
     port: int = Field(0, ge=0, le=65535)
-    robot: RobotFolder = Path("robot_description/hoap3")
+    robot: RobotFolder | None = Path("robot_description/hoap3")
     surface: Surface = Surface()
+    texts: Texts = Texts()
 
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, or a person's stop has brought the arm to rest."""
-    picture = LivePicture(RobotDescription.load(config.robot), config.title, config.surface)
+    robot = None if config.robot is None else RobotDescription.load(config.robot)
+    picture = LivePicture(robot, config.title, config.surface, config.texts, begun_ns=bus.settings.begun_ns)
     with PageServer(bus.run_folder, config.port) as page:
         button = StopButton(page.was_pressed, lambda request: bus.publish(topics.OPERATOR_STOP, request))
         bus.when_readable(page.pressed, lambda: button.look(bus.now_ns))

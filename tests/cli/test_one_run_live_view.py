@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from paramove.cli import one_run as live_view
+from paramove.cli import set_up_view
 from paramove.dashboard.link_file import LinkFile
 from paramove.supervision import application
 from paramove.supervision.launch_file import load
@@ -40,7 +41,7 @@ def test_the_page_is_laid_over_what_was_chosen_and_fits(overlays, expected):
 
 def test_the_link_is_told_once_and_no_browser_opens_without_a_display(tmp_path, monkeypatch):
     opened = []
-    monkeypatch.setattr(live_view.webbrowser, "open", opened.append)
+    monkeypatch.setattr(set_up_view.webbrowser, "open", opened.append)
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     shown = Shown()

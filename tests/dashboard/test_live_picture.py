@@ -39,7 +39,7 @@ def sections(*said: tuple[Topic, Any]) -> dict[str, Any]:
 
 def test_the_middle_of_a_run_is_shown() -> None:
     shown = sections(*scene.messages())
-    assert shown["world"]["title"] == "a title"
+    assert shown["page"]["title"] == "a title"
     assert shown["stage"] == {"stage": "apply", "step": "relocating", "grasps": 5, "retries": 0}
     assert shown["words"][-1]["sentence"] == scene.SENTENCE
     assert shown["safety"] == {"state": "armed", "faults": [], "refused": 0}
@@ -61,7 +61,7 @@ def test_a_tracked_arm_is_drawn_with_its_ball() -> None:
     ball.position.x, ball.position.y = 50.0, 60.0
     ball.fill_color.r = 2.0  # no such colour
     assert sections((topics.ACTION_OUTLINE, outline))["arm"] == {
-        "lines": [{"points": [[10.0, 20.0], [30.0, 40.0]], "colour": "rgb(0 255 0)"}],
+        "lines": [{"points": [[10.0, 20.0], [30.0, 40.0]], "closed": False, "colour": "rgb(0 255 0)"}],
         "balls": [{"place": [50.0, 60.0], "diameter": 9.0, "colour": "rgb(255 0 0)"}],
     }
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from paramove.bus import topics
-from paramove.dashboard.live_picture import LivePicture, Surface
+from paramove.dashboard.live_picture import LivePicture, Surface, Texts
 from paramove.dashboard.server import PageServer
 from paramove.dashboard.stop_button import StopButton
 from paramove.msgs.relocation_pb2 import RelocationStatus
@@ -28,6 +28,11 @@ pytestmark = [
         program() is None, reason="no Chromium here; as root run: apt-get install -y --no-install-recommends chromium"
     ),
 ]
+TEXTS = Texts(
+    stages={"calibrate": "Calibrate", "learn": "Learn", "apply": "Apply", "done": "Done"},
+    belongs="belongs in the opening at",
+    origin="the right shoulder",
+)
 STOPPED = "stopped from the page by a person"
 
 
@@ -37,7 +42,7 @@ class Run:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.alive = True
-        self.picture = LivePicture(HOAP3, "Learn rules by watching", Surface(), wall_s=lambda: 0.0)
+        self.picture = LivePicture(HOAP3, "Learn rules by watching", Surface(), TEXTS, wall_s=lambda: 0.0)
         self.page = PageServer(folder)
         self.said: list[StopRequest] = []
         self.button = StopButton(self.page.was_pressed, self.said.append)
@@ -58,7 +63,7 @@ class Run:
         with self._lock:
             self.page = PageServer(self.folder)
             self.button = StopButton(self.page.was_pressed, self.said.append)
-            self.picture = LivePicture(HOAP3, "Learn rules by watching", Surface(), wall_s=lambda: 0.0)
+            self.picture = LivePicture(HOAP3, "Learn rules by watching", Surface(), TEXTS, wall_s=lambda: 0.0)
             self.page.__enter__()
             self.alive = True
 
@@ -158,6 +163,27 @@ def test_all_that_a_person_wants_to_know_is_on_the_page(run: Run, browser: Brows
     assert browser.run("location.href").endswith("/"), "the token is not left in the address"
     assert browser.run("document.cookie") == "", "scripts cannot read the session"
     expect_clean(browser)
+
+
+def test_a_run_without_a_robot_has_picture_and_processes(run: Run, browser: Browser) -> None:
+    run.picture = LivePicture(None, "Point", Surface(), wall_s=lambda: 0.0)
+    run.publish(*scene.messages())
+    browser.open(run.page.link)
+    browser.until("document.body?.classList.contains('without-robot')", "the page has its title")
+    shown = "[...document.querySelectorAll('.card, #stop, #gate')].filter((e) => e.checkVisibility())"
+    assert browser.run(f"{shown}.map((e) => e.className).join()") == "card camera,card nodes"
+    expect_clean(browser)
+
+
+def test_after_the_end_nothing_is_armed(run: Run, browser: Browser) -> None:
+    opened(browser, run)
+    run.page.say_farewell("all is done")
+    with run._lock:
+        run.page.__exit__(None, None, None)
+        run.alive = False
+    browser.until("document.getElementById('gate-state').textContent === 'ended'", "the gate's state is over")
+    assert browser.run("document.getElementById('gate').dataset.state") == "ended"
+    run.comes_back()
 
 
 def test_the_3d_view_draws_the_robot(run: Run, browser: Browser, tmp_path: Path) -> None:

@@ -6,6 +6,9 @@ are simulated at the measured noise, since no pose network finds a person in a d
 
 from __future__ import annotations
 
+import os
+import pty
+import select
 import subprocess
 import sys
 import time
@@ -73,44 +76,84 @@ def pointing_video(path):
     write_video(path, images)
 
 
-def test_from_nothing_to_the_ball_in_five_minutes(launcher, tmp_path):
-    board_video(tmp_path / "board.avi")
-    moving_arm(tmp_path / "arm.mcap")
-    pointing_video(tmp_path / "pointing.avi")
+OVERLAY = f"""
+needs:
+  cameras:
+    made_by: "paramove calibrate cameras file:rehearsal/board.avi --square 45mm --out {{action_tracker.cameras}}"
+  person:
+    made_by: "paramove webcam person --source recording:rehearsal/person.mcap --height {HEIGHT} --out person.yaml"
+nodes:
+  pose_detector: {{parameters: {{networks: rehearsal}}}}
+"""
 
-    def typed(*words):
-        command = [sys.executable, "-m", "paramove.cli.main", *words]
-        done = subprocess.run(
-            command, cwd=tmp_path, capture_output=True, text=True, timeout=200, env=launcher.environment
+
+class Typist:
+    """A person at a terminal, who presses Enter whenever asked to."""
+
+    def __init__(self, command, folder, environment):
+        self._terminal, end = pty.openpty()
+        self.process = subprocess.Popen(
+            command, cwd=folder, env=environment, stdin=end, stdout=end, stderr=end, start_new_session=True
         )
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout
+        os.close(end)
+        self.shown = ""
 
+    def until_the_end(self, timeout_s):
+        ends_s, pressed = time.monotonic() + timeout_s, 0
+        while time.monotonic() < ends_s:
+            if not select.select([self._terminal], [], [], 1.0)[0]:
+                continue
+            try:
+                self.shown += os.read(self._terminal, 65536).decode(errors="replace")
+            except OSError:  # the last process has closed its end
+                return self.process.wait(10.0)
+            if self.shown.count("press Enter") > pressed:
+                pressed += 1
+                os.write(self._terminal, b"\n")
+        self.process.terminate()
+        raise TimeoutError(self.shown)
+
+
+def test_from_nothing_to_the_ball_in_five_minutes(launcher, tmp_path):
+    folder = tmp_path / "rehearsal"
+    folder.mkdir()
+    board_video(folder / "board.avi")
+    moving_arm(folder / "person.mcap")
+    pointing_video(folder / "pointing.avi")
+    (tmp_path / "mine.yaml").write_text(OVERLAY)
+
+    words = ("launch", "pointing", "--with", "real", "--with", "rehearsal", "--with", "mine.yaml", "--headless")
     began_s = time.monotonic()
-    said = typed("calibrate", "cameras", "board.avi", "--square", "45mm", "--out", "cameras.yaml")
-    assert "(good)" in said
-    assert np.linalg.norm(read_cameras(tmp_path / "cameras.yaml")[0].position - CAMERA.position) < 0.02
+    person_at_terminal = Typist([sys.executable, "-m", "paramove.cli.main", *words], tmp_path, launcher.environment)
+    code = person_at_terminal.until_the_end(60.0 * MINUTES)
+    took_s, said = time.monotonic() - began_s, person_at_terminal.shown
+    assert code == 0, said
 
-    said = typed("webcam", "person", "--out", "person.yaml", "--source", "recording:arm.mcap", "--height", HEIGHT)
-    assert said.index("hang still") < said.index("move your right arm") < said.index("person.yaml: written")
+    steps = ("board.pdf is missing", "cameras.yaml is missing", "(good)", "person.yaml is missing", "hang still",
+             "move your right arm", "person.yaml: written", "run folder")  # fmt: skip
+    assert [said.index(step) for step in steps] == sorted(said.index(step) for step in steps)
+    assert (tmp_path / "board.pdf").read_bytes().startswith(b"%PDF")
+    assert np.linalg.norm(read_cameras(tmp_path / "cameras.yaml")[0].position - CAMERA.position) < 0.02
     person = read_person(tmp_path / "person.yaml")
     assert np.linalg.norm(np.array(person.shoulder) - RESTING_SHOULDER) < 0.2
 
-    code, shown = launcher.run(
-        "pointing", "--with", "replay", "--headless",
-        "--set", f"camera_1.source=file:{tmp_path / 'pointing.avi'}",
-        "--set", f"action_tracker.cameras={tmp_path / 'cameras.yaml'}",
-        "--set", f"action_tracker.person={tmp_path / 'person.yaml'}",
-        "--set", f"pose_detector.networks={tmp_path}", timeout_s=250,
-    )  # fmt: skip
-    took_s = time.monotonic() - began_s
-    assert code == 0, shown
-    estimates = [one.message for one in read(launcher.latest / "recording.mcap", ("action/estimate",))]
+    recording = tmp_path / "runs" / "latest" / "recording.mcap"
+    estimates = [one.message for one in read(recording, ("action/estimate",))]
     certain = min(estimates, key=lambda one: max(one.pointed.x_deviation, one.pointed.y_deviation)).pointed
     off = np.hypot(*(np.array([certain.x, certain.y]) - table_place(PLACE)[:2]))
     assert off < 0.1, "one camera, without a ruler"
-    scenes = [one.message for one in read(launcher.latest / "recording.mcap", ("action/scene",))]
+    scenes = [one.message for one in read(recording, ("action/scene",))]
     red = [one.entities[0].spheres[0].color.r for one in scenes]
     assert red[0] > 0.9, "nothing is known yet"
     assert min(red) < 0.6, "the ball never became certain"
     assert took_s < 60.0 * MINUTES
+
+
+def test_without_a_terminal_the_first_step_is_named(launcher, tmp_path):
+    command = [sys.executable, "-m", "paramove.cli.main", "launch", "pointing", "--with", "real"]
+    done = subprocess.run(
+        command, cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True, env=launcher.environment
+    )
+    assert done.returncode == 66
+    assert "paramove calibrate board --out board.pdf" in done.stderr
+    assert not list(tmp_path.glob("*.pdf"))

@@ -40,6 +40,7 @@ class BusSettings(BaseModel):
         truth_folder: Of the sockets of topics under `truth/`; given to the simulator and evaluators only.
         remaps: Topic name in the node -> topic name on the bus.
         members: Names of all nodes that time waits for in lockstep. Read by the simulator only.
+        begun_ns: When the run began, by its clock.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -50,6 +51,7 @@ class BusSettings(BaseModel):
     truth_folder: Path | None = None
     remaps: dict[str, str] = Field(default_factory=dict)
     members: tuple[str, ...] = ()
+    begun_ns: int = 0
 
     def folder_of(self, topic: Topic) -> Path:
         """Folder of the topic's socket; raises ValueError for ground truth whose folder this process does not get."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from paramove.cli.set_up_view import Prompts, ViewOption, prompts
 from paramove.documents import Image, InputError, exit_codes, printable
 
 if TYPE_CHECKING:
@@ -94,6 +95,7 @@ def cameras(
     size: Annotated[
         str, typer.Option(metavar="WxH", help="resolution requested from live cameras; files have their own")
     ] = LIVE_SIZE,
+    view: ViewOption = False,
 ) -> None:
     """Find lens and pose of cameras from images of the board; all poses in the frame of the table.
 
@@ -105,7 +107,8 @@ def cameras(
     from paramove.cameras import write_cameras
 
     try:
-        placed = _calibrated(sources, _board(square, thickness), pixels(size))
+        with prompts("Calibrate cameras", view) as to_person:
+            placed = _calibrated(sources, _board(square, thickness), pixels(size), to_person)
         write_cameras(out, [placement.camera for placement in placed])
     except InputError as error:
         raise _ended(str(error), error.exit_code) from error
@@ -135,11 +138,11 @@ def pixels(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def _calibrated(texts: Sequence[str], board: Board, size: tuple[int, int]) -> list[Placement]:
+def _calibrated(texts: Sequence[str], board: Board, size: tuple[int, int], to_person: Prompts) -> list[Placement]:
     """First all lenses, then all poses: the board lies on the table once for all cameras."""
     from paramove.cameras import CalibrationError, calibrate_lens, check_square, place_camera
 
-    sources = [_source(text, size) for text in texts]
+    sources = [_source(text, size, to_person) for text in texts]
     names = [source.name for source in sources]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -162,7 +165,7 @@ def _calibrated(texts: Sequence[str], board: Board, size: tuple[int, int]) -> li
         typer.echo(f"  {remark}")
     placed = []
     if any(_is_live(text) for text in texts):
-        typer.echo("now lay the board on the table as printed on it, in view of all cameras, and leave it there")
+        to_person.say("now lay the board on the table as printed on it, in view of all cameras, and leave it there")
     for source, lens in zip(sources, lenses, strict=True):
         views = source.table().views
         check_square(board, [*views_of_all, *views])
@@ -216,16 +219,26 @@ def _tell_agreement(placed: Sequence[Placement], board: Board) -> None:
 
 
 def _is_live(text: str) -> bool:
+    text = text.removeprefix("device:")
     return text.isdigit() or text.startswith("/dev/")
 
 
-def _source(text: str, size: tuple[int, int]) -> ImageSource:
+def _source(text: str, size: tuple[int, int], to_person: Prompts) -> ImageSource:
     from paramove.cameras import LiveImages, file_source
 
+    text = text.removeprefix("device:").removeprefix("file:")
     if not _is_live(text):
         return file_source(Path(text))
     name = f"camera{text}" if text.isdigit() else Path(text).name
-    return LiveImages(name, _live_frames(text, size), lambda message: typer.echo(printable(message)))
+    return LiveImages(name, _shown(_live_frames(text, size), to_person), to_person.say)
+
+
+def _shown(frames: Iterator[tuple[float, Image]], to_person: Prompts) -> Iterator[tuple[float, Image]]:
+    """The same frames, which the page shows on their way."""
+    for time_s, image in frames:
+        if to_person.page is not None:
+            to_person.page.show(image)
+        yield time_s, image
 
 
 def _live_frames(device: str, size: tuple[int, int]) -> Iterator[tuple[float, Image]]:

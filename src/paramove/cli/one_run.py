@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import shutil
 import signal
 import sys
 import tempfile
-import threading
-import webbrowser
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
 
-from paramove.dashboard import link_in
+from paramove.cli.preparing import prepared
+from paramove.cli.set_up_view import open_where_displayed
+from paramove.dashboard import NAME, link_in
 from paramove.documents import DocumentError, exit_codes
 from paramove.supervision import (
     DomainError,
@@ -78,12 +80,17 @@ def _run(options: RunOptions, check_only: bool, output: QueuedOutput) -> int:
             application.check(launch, workspace)
             console.print("\n".join(_found(launch, environment, workspace)), soft_wrap=True)
             return exit_codes.OK
-        outcome, folder = application.run(
-            launch,
-            workspace,
-            lambda folder: _view(console, output, folder, environment, workspace, options.headless),
-            options.runs,
-        )
+        with tempfile.TemporaryDirectory() as set_up:
+            pages = Path(set_up)
+            if code := prepared(launch, workspace, pages if options.page else None):
+                return code
+
+            def view(folder: RunFolder) -> View:
+                with contextlib.suppress(FileNotFoundError):  # the page of this run follows that of the set-up
+                    shutil.move(pages / NAME, folder.path / NAME)
+                return _view(console, output, folder, environment, workspace, options.headless)
+
+            outcome, folder = application.run(launch, workspace, view, options.runs)
     except LaunchFileMissingError as error:
         errors.print(str(error))
         return exit_codes.INPUT_MISSING
@@ -203,15 +210,9 @@ class AnnouncingView:
         if not self._link_printed and (link := link_in(self._run_folder)):
             self._link_printed = True
             self._view.story(f"live page: {link}")
-            if _has_display():
-                threading.Thread(target=webbrowser.open, args=(link,), daemon=True).start()  # it may take seconds
+            open_where_displayed(link)
         self._view.refresh(nodes)
 
     def close(self) -> None:
         """As the other view."""
         self._view.close()
-
-
-def _has_display() -> bool:
-    """Whether a person at this machine's screen uses this terminal."""
-    return sys.stdout.isatty() and bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from paramove.cli.demos_options import ended, one_line
-from paramove.documents import exit_codes, printable
+from paramove.cli.set_up_view import Prompts, ViewOption, prompts
+from paramove.documents import exit_codes
 
 if TYPE_CHECKING:
     from paramove.observation import BodyKeyPoints, WebcamTeacher
@@ -44,6 +45,7 @@ def webcam(
     ] = None,
     subject: Annotated[str, typer.Option("--subject", help="person who demonstrates it")] = "",
     append: Annotated[bool, typer.Option("--append", help="to a set that is there already")] = False,
+    view: ViewOption = False,
 ) -> None:
     """Record demonstrations: your arm hangs, then you touch a corner of the board and hold it there; nine times.
 
@@ -72,7 +74,8 @@ def webcam(
         sizes, shoulder = (None, None) if who is None else (who.sizes, who.shoulder)
         teacher = WebcamTeacher(calibrated, places, taught, sizes=sizes, shoulder=shoulder)
         try:
-            _lead(teacher, seen_by(calibrated, source))
+            with prompts(f"Teach {action}", view) as to_person:
+                _lead(teacher, seen_by(calibrated, source, prompts=to_person), to_person)
         except KeyboardInterrupt:
             raise ended(f"{folder}: {len(taught.written)} movements", exit_codes.by_signal(signal.SIGINT)) from None
     typer.echo(f"{folder}: {len(taught.written)} new; train a model with `paramove train {folder}`")
@@ -80,13 +83,12 @@ def webcam(
         raise typer.Exit(exit_codes.FAILURE)
 
 
-def _lead(teacher: WebcamTeacher, key_points: Iterator[tuple[str, int, BodyKeyPoints]]) -> None:
+def _lead(teacher: WebcamTeacher, key_points: Iterator[tuple[str, int, BodyKeyPoints]], to_person: Prompts) -> None:
     """Until all positions are touched, or the images end."""
-    typer.echo(teacher.prompt)
+    to_person.say(teacher.prompt)
     for camera, captured_ns, points in key_points:
         happened = teacher.see(camera, captured_ns, points)
         if happened:
-            typer.echo(printable(happened))
-            typer.echo(teacher.prompt)
+            to_person.say(teacher.prompt, happened)
         if teacher.finished:
             return

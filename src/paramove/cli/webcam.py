@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from paramove.cli.demos_options import ended
-from paramove.documents import exit_codes, printable
+from paramove.cli.set_up_view import Prompts, ViewOption, prompts
+from paramove.documents import exit_codes
 
 if TYPE_CHECKING:
     from paramove.cameras import CalibratedCamera
     from paramove.documents import Image
-    from paramove.observation import BodyKeyPoints
+    from paramove.observation import BodyKeyPoints, MeasuredArm
 
 app = typer.Typer(name="webcam", no_args_is_help=True, help="Track a person with a webcam.")
 
@@ -62,6 +63,7 @@ def look(
         str, typer.Option(metavar="SOURCE", help="device:/dev/video0, file:VIDEO or folder:PICTURES@RATE")
     ],
     size: Annotated[str, typer.Option(metavar="WxH", help="resolution; files have their own")] = "640x480",
+    view: ViewOption = False,
 ) -> None:
     """Try a camera in the first minute, uncalibrated: where the right arm points, once a second, and what is wrong.
 
@@ -82,16 +84,17 @@ def look(
         checked_networks()
         camera = CalibratedCamera("webcam", width, height, np.diag([width, width, 1.0]), np.zeros(0), np.eye(4))
         latest_s = -1.0
-        for _, captured_ns, points in seen_by([camera], [source]):
-            x, y, z = points.arm_direction
-            if captured_ns * 1e-9 - latest_s >= 1.0 and np.isfinite(z):
-                latest_s = captured_ns * 1e-9
-                aside, up = np.degrees(np.arctan2(x, np.hypot(y, z))), np.degrees(np.arctan2(-y, np.hypot(x, z)))
-                towards = "towards the camera" if z < 0.0 else "away from the camera"
-                typer.echo(
-                    f"right arm: {abs(aside):.0f} deg to the picture's {'right' if aside > 0 else 'left'}, "
-                    f"{abs(up):.0f} deg {'up' if up > 0 else 'down'}, {towards}; uncalibrated: directions only"
-                )
+        with prompts("Try the camera", view) as to_person:
+            for _, captured_ns, points in seen_by([camera], [source], prompts=to_person):
+                x, y, z = points.arm_direction
+                if captured_ns * 1e-9 - latest_s >= 1.0 and np.isfinite(z):
+                    latest_s = captured_ns * 1e-9
+                    aside, up = np.degrees(np.arctan2(x, np.hypot(y, z))), np.degrees(np.arctan2(-y, np.hypot(x, z)))
+                    towards = "towards the camera" if z < 0.0 else "away from the camera"
+                    to_person.say(
+                        f"right arm: {abs(aside):.0f} deg to the picture's {'right' if aside > 0 else 'left'}, "
+                        f"{abs(up):.0f} deg {'up' if up > 0 else 'down'}, {towards}; uncalibrated: directions only"
+                    )
     except KeyboardInterrupt:
         return
     except InputError as error:
@@ -112,6 +115,7 @@ def person(
         str | None, typer.Option(metavar="LENGTH", help="of your right shoulder from the camera, such as 1.5m")
     ] = None,
     height: Annotated[str | None, typer.Option(metavar="LENGTH", help="your height, such as 1.75m")] = None,
+    view: ViewOption = False,
 ) -> None:
     """Measure a person without a ruler: follow the prompts for ten seconds.
 
@@ -125,31 +129,20 @@ def person(
     from paramove.cameras import measured_cameras
     from paramove.cli.calibrate import length
     from paramove.documents import InputError
-    from paramove.observation import PersonSetUp, checked_networks
+    from paramove.observation import checked_networks
 
     try:
         camera = measured_cameras(Path(), cameras)[0]
         far = None if distance is None else length(distance, "--distance")
         tall = None if height is None else length(height, "--height")
-        images = None if source.startswith("recording:") else _images(camera, source)
-        if images is not None:
+        live = not source.startswith("recording:")
+        if live:
             checked_networks()
-        if square is not None:
-            far = _at_chest(camera, images, length(square, "--square"))
-        set_up = PersonSetUp(camera, distance=far, height=tall)
-        typer.echo(set_up.prompt)
-        for name, _, points in seen_by([camera], [source], images):
-            if name != camera.name:
-                continue
-            happened = set_up.see(points)
-            if happened:
-                typer.echo(printable(happened))
-                typer.echo(set_up.prompt)
-            if set_up.arm is not None:
-                break
-        if set_up.arm is None:
-            raise ended("the images ended before the person was measured", exit_codes.FAILURE)
-        arm = set_up.arm
+        with prompts("Measure a person", view) as to_person:
+            images = _images(camera, source, to_person) if live else None
+            if square is not None:
+                far = _at_chest(camera, images, length(square, "--square"), to_person)
+            arm = _measured(camera, source, images, to_person, far, tall)
         sizes = {"upper_arm": arm.upper_arm, "forearm": arm.forearm, "hand": arm.hand}
         write_person(out, Person(shoulder=tuple(arm.shoulder), **sizes))
     except InputError as error:
@@ -159,15 +152,37 @@ def person(
     typer.echo(f"{out}: written; the shoulder is in the frame of the table")
 
 
-def _images(camera: CalibratedCamera, source: str) -> Iterator[tuple[CalibratedCamera, int, Image]]:
+def _measured(
+    camera: CalibratedCamera, source: str, images: Iterator[tuple[CalibratedCamera, int, Image]] | None,
+    to_person: Prompts, distance: float | None, height: float | None,
+) -> MeasuredArm:  # fmt: skip
+    """The arm of a person who follows the prompts."""
+    from paramove.observation import PersonSetUp
+
+    set_up = PersonSetUp(camera, distance=distance, height=height)
+    to_person.say(set_up.prompt)
+    for name, _, points in seen_by([camera], [source], images, to_person):
+        if name != camera.name:
+            continue
+        happened = set_up.see(points)
+        if happened:
+            to_person.say(set_up.prompt, happened)
+        if set_up.arm is not None:
+            return set_up.arm
+    raise ended("the images ended before the person was measured", exit_codes.FAILURE)
+
+
+def _images(camera: CalibratedCamera, source: str, to_person: Prompts) -> Iterator[tuple[CalibratedCamera, int, Image]]:
     from paramove.observation import images_of
 
-    return images_of([camera], [source])
+    images = images_of([camera], [source])
+    return images if to_person.page is None else to_person.page.passing(images)
 
 
 def _at_chest(
-    camera: CalibratedCamera, images: Iterator[tuple[CalibratedCamera, int, Image]] | None, square: float
-) -> float:
+    camera: CalibratedCamera, images: Iterator[tuple[CalibratedCamera, int, Image]] | None, square: float,
+    to_person: Prompts,
+) -> float:  # fmt: skip
     """Distance of the shoulder, m, by a board that is held at the chest."""
     import numpy as np
 
@@ -176,7 +191,7 @@ def _at_chest(
 
     if images is None:
         raise InputError("--square needs images of the board: a recording of key points has none")
-    typer.echo("hold the board flat at your chest, towards the camera")
+    to_person.say("hold the board flat at your chest, towards the camera")
     finder, depths = BoardFinder(), list[float]()
     for _, _, image in images:
         view = finder.find(image)
@@ -187,15 +202,18 @@ def _at_chest(
     if len(depths) < BOARD_LOOKS:
         raise InputError("the images ended before the board was detected at the chest")
     far = float(np.median(depths)) + CHEST_M
-    typer.echo(f"your shoulder is {far:.2f} m from the camera; put the board away")
+    to_person.say(f"your shoulder is {far:.2f} m from the camera; put the board away")
     return far
 
 
 def seen_by(
     cameras: Sequence[CalibratedCamera], sources: Sequence[str],
-    images: Iterator[tuple[CalibratedCamera, int, Image]] | None = None,
+    images: Iterator[tuple[CalibratedCamera, int, Image]] | None = None, prompts: Prompts | None = None,
 ) -> Iterator[tuple[str, int, BodyKeyPoints]]:  # fmt: skip
-    """Camera, capture time, ns, and key points of images, or of sources as named on the command line."""
+    """Camera, capture time, ns, and key points of images, or of sources as named on the command line.
+
+    `prompts` shows both, unless the images are given, and what is wrong with the pictures.
+    """
     from paramove.documents import InputError
     from paramove.observation import detected_key_points, images_of, recorded_key_points
 
@@ -203,8 +221,11 @@ def seen_by(
         return recorded_key_points(Path(sources[0].removeprefix("recording:")))
     if len(sources) != len(cameras):
         raise InputError(f"{len(cameras)} cameras are calibrated, {len(sources)} sources given: one --source for each")
-    images = images_of(cameras, sources) if images is None else images
+    prompts = prompts or Prompts()
+    page = prompts.page
+    if images is None:
+        images = images_of(cameras, sources)
+        images = images if page is None else page.passing(images)
     offline = not any(source.startswith("device:") for source in sources)
-    return detected_key_points(
-        images, lambda trouble: typer.echo(printable(trouble or "all is well again")), offline=offline
-    )
+    found = detected_key_points(images, lambda trouble: prompts.add(trouble or "all is well again"), offline=offline)
+    return found if page is None else page.drawing(found, cameras[0].name)

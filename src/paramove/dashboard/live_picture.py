@@ -10,6 +10,7 @@ from typing import Any
 
 from foxglove_schemas_protobuf.Color_pb2 import Color
 from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
+from foxglove_schemas_protobuf.PointsAnnotation_pb2 import PointsAnnotation
 from pydantic import BaseModel, ConfigDict
 
 from paramove.bus import Bus, Received, topics
@@ -84,42 +85,57 @@ class Surface(BaseModel):
     object_height: float = 0.050
 
 
+class Texts(BaseModel):
+    """Words of the application.
+
+    Attributes:
+        stages: Name of a stage of the application: how the page calls it, in their order.
+        belongs: Head of the column with the positions that the rules give.
+        origin: Where positions are measured from.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    stages: dict[str, str] = {}
+    belongs: str = "belongs at"
+    origin: str = "the robot's base"
+
+
 class LivePicture:
     """Sections of the page by name, as JSON values.
 
     Args:
-        robot: Its shape, joints and base pose.
+        robot: Its shape, joints and base pose; None for a run without one.
         title: Of the page.
         surface: The working surface and the objects on it.
+        texts: Words of the application.
         side: Arm whose shoulder's frame positions are in; with a servo arm it is the base's.
+        begun_ns: When the run began, by the bus clock.
         wall_s: Monotonic wall clock, for the age of the nodes' statuses.
     """
 
     def __init__(
         self,
-        robot: RobotDescription,
+        robot: RobotDescription | None,
         title: str,
         surface: Surface,
+        texts: Texts | None = None,
+        *,
         side: str = "right",
+        begun_ns: int = 0,
         wall_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        origin, self._gripper = _sites_of(robot, side)
-        self._shape = RobotShape(robot.model_path, dict(zip(robot.joint_names, robot.base_pose, strict=True)))
+        self._robot = None if robot is None else _DrawnRobot(robot, surface, side)
         self._estimates = Estimates((surface.x, surface.y))
         self._nodes = NodeTable()
         self._wall_s = wall_s
+        self._begun_ns = begun_ns
         self._given: dict[str, Any] = {}
-        self._joints: Any = None
         self._safety: dict[str, Any] = {}
         self._arm: dict[str, Any] = {}
         self._image: bytes | None = None
-        self._world = {
-            "title": title,
-            "parts": self._shape.parts(),
-            "shoulder": [round(float(value), 5) for value in self._shape.site(origin)],
-            "surface": {"x": surface.x, "y": surface.y, "z": surface.z},
-            "object": {"radius": surface.object_radius, "height": surface.object_height},
-        }
+        texts = texts or Texts()
+        self._page = {"title": title, "robot": robot is not None, **texts.model_dump()}
         estimates = self._estimates
         self._handlers: dict[str, Callable[[Any, float], None]] = {
             topics.APPLICATION_STAGE.name: estimates.on_stage,
@@ -140,8 +156,8 @@ class LivePicture:
             self._image = bytes(received.message.data)
         elif received.topic.name == topics.ACTION_OUTLINE.name:
             self._arm = _drawn_arm(received.message)
-        elif received.topic.name == topics.ARM_JOINT_STATES.name:
-            self._joints = received.message
+        elif received.topic.name == topics.ARM_JOINT_STATES.name and self._robot is not None:
+            self._robot.joints = received.message
         elif received.topic.name == topics.ARM_SAFETY.name:
             self._safety = _safety(received.message)
         elif received.topic.type is NodeStatus:
@@ -154,14 +170,11 @@ class LivePicture:
             now_ns: Time of the bus clock.
             stop: Progress of a person's stop.
         """
-        if self._joints is not None:
-            self._shape.move({joint.name: joint.position for joint in self._joints.joints})
-            self._joints = None
         sections = {
-            "world": self._world,
-            "clock": round(now_ns * 1e-9, 1),
+            "page": self._page,
+            "clock": round(max(now_ns - self._begun_ns, 0) * 1e-9, 1),
             **self._estimates.sections(now_ns * 1e-9),
-            "robot": {"poses": self._shape.poses(), "gripper": _rounded(self._shape.site(self._gripper))},
+            **({} if self._robot is None else self._robot.sections()),
             "arm": self._arm,
             "safety": self._safety,
             "stop": stop,
@@ -176,6 +189,29 @@ class LivePicture:
         """The latest image if there is one that was not given yet, JPEG."""
         image, self._image = self._image, None
         return image
+
+
+class _DrawnRobot:
+    """The robot and its surface, as the page draws them; `joints` is the latest message of its joints."""
+
+    def __init__(self, robot: RobotDescription, surface: Surface, side: str) -> None:
+        origin, self._gripper = _sites_of(robot, side)
+        self._shape = RobotShape(robot.model_path, dict(zip(robot.joint_names, robot.base_pose, strict=True)))
+        self.joints: Any = None
+        self._world = {
+            "parts": self._shape.parts(),
+            "shoulder": _rounded(self._shape.site(origin)),
+            "surface": {"x": surface.x, "y": surface.y, "z": surface.z},
+            "object": {"radius": surface.object_radius, "height": surface.object_height},
+        }
+
+    def sections(self) -> dict[str, Any]:
+        """What stands still, and what moves."""
+        if self.joints is not None:
+            self._shape.move({joint.name: joint.position for joint in self.joints.joints})
+            self.joints = None
+        moving = {"poses": self._shape.poses(), "gripper": _rounded(self._shape.site(self._gripper))}
+        return {"world": self._world, "robot": moving}
 
 
 def _sites_of(robot: RobotDescription, side: str) -> tuple[str, str]:
@@ -200,6 +236,7 @@ def _drawn_arm(message: ImageAnnotations) -> dict[str, Any]:
         "lines": [
             {
                 "points": [[round(point.x, 1), round(point.y, 1)] for point in line.points],
+                "closed": line.type == PointsAnnotation.LINE_LOOP,
                 "colour": _css(line.outline_color),
             }
             for line in message.points

@@ -59,13 +59,15 @@ class PageServer:
     Args:
         folder: Of the run; the link is written there.
         port: 0: a free one. A page that was restarted in the same run takes the port it had.
+        followed: Another page follows in this folder: browsers wait for it when this one ends.
 
     Attributes:
         pressed: An eventfd that can be read once the stop button was pressed.
         link: Link to open in a browser.
     """
 
-    def __init__(self, folder: Path, port: int = 0) -> None:
+    def __init__(self, folder: Path, port: int = 0, *, followed: bool = False) -> None:
+        self._followed = followed
         self._files = _read_files()
         self._link_file = LinkFile.stored_or_new(folder, port)
         self._access = Access(0, frozenset(self._files) - {START}, self._link_file.secrets)
@@ -131,12 +133,13 @@ class PageServer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is not None:  # the page will be restarted: browsers wait for it
+        stays = self._followed or kind is not None  # the page will be restarted: browsers wait for it
+        if stays:
             self._farewell = ""
         self._loop.call_soon_threadsafe(self._leaving.set)
         self._thread.join()
         os.close(self.pressed)
-        if kind is None:  # a page restarted after a failure has the same secrets
+        if not stays:  # a page that follows has the same secrets
             self._link_file.remove()
 
     def _run(self) -> None:

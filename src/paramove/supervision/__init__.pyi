@@ -27,6 +27,8 @@ from .launch_schema import FILES as FILES
 from .launch_schema import LaunchFile as LaunchFile
 from .launch_schema import editor_schema as editor_schema
 from .launch_schema import schema_as_text as schema_as_text
+from .needs import MissingFile as MissingFile
+from .needs import missing_files as missing_files
 from .queued_output import QueuedOutput as QueuedOutput
 from .run_folder import RunFolder as RunFolder
 from .run_logs import LEVELS as LEVELS

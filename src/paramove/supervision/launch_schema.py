@@ -89,6 +89,14 @@ class NodeSettings(_Checked):
     )
 
 
+class NeededFile(_Checked):
+    """A file that a person makes before the first run. `{node.parameter}` stands for the value of a parameter."""
+
+    file: str = Field(description="path of the file")
+    about: str = Field(description="what is in it, for people")
+    made_by: str = Field(description="command of paramove that makes it, with the person's help")
+
+
 class LaunchFile(_Checked):
     """One application: its nodes and how they are restarted."""
 
@@ -101,6 +109,9 @@ class LaunchFile(_Checked):
         default_factory=list,
         description="node.parameter that selects the hardware: --set accepts it only with an overlay, named by "
         "--with, that sets it",
+    )
+    needs: dict[Name, NeededFile] = Field(
+        default_factory=dict, description="files that must be there; a terminal offers to make missing ones, in order"
     )
     headless: dict[str, Any] = Field(default_factory=dict, description="node.parameter: value that --headless sets")
     after_run: Module | None = Field(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import os
+import time
 from pathlib import Path
 from typing import Any
 
@@ -72,13 +73,15 @@ class RunFolder:
             truth_folder: Of the sockets of the ground truth; only nodes with `truth: true` get it.
             clock: Node that publishes the clock; in lockstep it gets the list of members.
         """
-        lockstep = launch.file.bus.lockstep
+        lockstep, begun_ns = launch.file.bus.lockstep, time.monotonic_ns()
         for name, node in launch.file.nodes.items():
             bus: dict[str, Any] = {
                 "folder": str(bus_folder),
                 "clock": launch.file.bus.clock,
                 "lockstep": lockstep and (node.lockstep or name == clock),
             }
+            if launch.file.bus.clock == "monotonic":
+                bus["begun_ns"] = begun_ns
             if name == clock and lockstep:
                 bus["members"] = [other for other, its in launch.file.nodes.items() if its.lockstep and other != clock]
             if node.truth:

@@ -51,10 +51,10 @@ export class CameraView {
 
   arm() { // of a tracked person, and the ball where it points
     const { lines = [], balls = [] } = this.state.arm, c = this.context, u = this.unit;
-    for (const { points, colour } of lines) {
+    for (const { points, closed, colour } of lines) {
       c.beginPath();
       points.forEach((point, index) => (index ? c.lineTo(...point) : c.moveTo(...point)));
-      c.closePath();
+      if (closed) c.closePath();
       c.strokeStyle = colour; c.lineWidth = 2 * u; c.stroke();
     }
     for (const { place, diameter, colour } of balls) {

@@ -4,7 +4,6 @@ import { colourOf, css } from "./colours.js";
 import { WorldView } from "./world.js";
 
 const $ = (id) => document.getElementById(id);
-const STAGES = ["calibrate", "learn", "apply", "done"];
 const RETRY_MS = 1000, QUIET_S = 3, CONFIRM_MS = 1000, OLD_IMAGE_MS = 2000, NO_STATUS_S = 3;
 
 const given = document.querySelector("meta[name=paramove-key]").content;
@@ -32,12 +31,23 @@ const pair = (position) => position.slice(0, 2).map((value) => (100 * value).toF
 const cm = (position) => `${pair(position)} cm`;
 
 const SHOW = {
-  world(content) { text($("title"), content.title); document.title = `${content.title} – paramove`; },
+  page(content) {
+    text($("title"), content.title);
+    document.title = `${content.title} – paramove`;
+    document.body.classList.toggle("without-robot", !content.robot);
+    text($("belongs"), content.belongs);
+    $("stages").replaceChildren(...Object.values(content.stages).map((label) => {
+      const item = document.createElement("li");
+      item.textContent = label;
+      return item;
+    }));
+    SHOW.stage(state.stage ?? {});
+    showRules(state.objects ?? {});
+  },
   stage(content) {
-    const now = STAGES.indexOf(content.stage);
+    const stages = Object.keys(state.page?.stages ?? {}), now = stages.indexOf(content.stage), last = stages.length - 1;
     $("stages").querySelectorAll("li").forEach((item, index) => {
-      const done = content.stage === "done";
-      item.className = index < now || (done && index === now) ? "past" : index === now ? "now" : "";
+      item.className = index < now || (index === now && now === last) ? "past" : index === now ? "now" : "";
       if (index === now) item.setAttribute("aria-current", "step"); else item.removeAttribute("aria-current");
     });
     text($("step"), content.step ?? "");
@@ -79,6 +89,7 @@ const SHOW = {
     if (content.progress !== "not asked" && content.progress !== "asked") pressedAt = null;
   },
   nodes(content) {
+    $("nodes").closest(".card").hidden = !content.length;
     const body = $("nodes"), ok = content.filter((node) => node.state === "ready" && node.silent_s <= NO_STATUS_S).length;
     text($("nodes-note"), `${ok} of ${content.length} ready`);
     body.replaceChildren(...content.map((node) => {
@@ -108,7 +119,7 @@ function showRules(objects) {
     return row;
   }));
   const learned = names.filter((name) => objects[name].rule).length;
-  text($("rules-note"), names.length ? `${learned} of ${names.length} learned. Positions are x, y from the right shoulder, as estimated by the robot.` : "No object detected yet.");
+  text($("rules-note"), names.length ? `${learned} of ${names.length} learned. Positions are x, y from ${state.page?.origin ?? "the base"}, as estimated by the robot.` : "No object detected yet.");
 }
 
 function draw() {
@@ -135,7 +146,7 @@ async function take(data, from) {
 function handle(message) {
   const { beat, ended: farewell, ...sections } = message;
   if (beat) quietS = beat.quiet_s;
-  if (farewell) ended = farewell;
+  if (farewell) { ended = farewell; $("gate").dataset.state = "ended"; text($("gate-state"), "ended"); }
   Object.assign(state, sections);
   for (const [name, content] of Object.entries(sections)) SHOW[name]?.(content);
   updateAlert();
@@ -147,6 +158,7 @@ function updateAlert() {
   let warning = "", calm = false;
   if (waited || (pressedAt !== null && !connected)) warning = "The stop is NOT confirmed. Use the robot's power switch.";
   else if (ended) [warning, calm] = [`The run has ended${/^The run has ended/.test(ended) ? "" : `: ${ended}`}. The page shows its last state.`, true];
+  else if (!connected && everConnected && state.page?.robot === false) [warning, calm] = ["Waiting for the next step …", true];
   else if (!connected && everConnected) warning = "Connection lost: the page shows an old state, and STOP does not reach the robot. Trying again …";
   else if (!connected) warning = "Not connected. Open the link that paramove launch --view printed; it works once.";
   else if (stopped) warning = `The arm is stopped and holds its pose: ${stopped}.`;
