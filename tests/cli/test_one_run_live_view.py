@@ -26,7 +26,8 @@ class Shown:
 
 
 @pytest.mark.parametrize(
-    ("overlays", "expected"), [(None, ["sim", "view"]), (["sim", "real_time"], ["sim", "real_time", "view"])]
+    ("overlays", "expected"),
+    [(None, ["sim", "view", "page"]), (["sim", "real_time"], ["sim", "real_time", "view", "page"])],
 )
 def test_the_page_is_laid_over_what_was_chosen_and_fits(overlays, expected):
     found, title = live_view.with_page(Workspace.at(ROOT), "rule_learning", overlays)

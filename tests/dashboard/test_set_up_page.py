@@ -35,7 +35,7 @@ def test_picture_arms_and_prompt_reach_a_browser(tmp_path):
             points = [("one", 0, arms()), ("two", 0, BodyKeyPoints.nobody())]
             assert list(page.drawing(iter(points), "one")) == points
             images = [(camera, 0, IMAGE) for camera in reversed(CAMERAS)]
-            assert list(page.passing(iter(images))) == images
+            assert list(page.passing(iter(images), "one")) == images
             live.send("next")
             picture = live.recv(WAIT_S)
             assert picture.startswith(b"\xff\xd8")

@@ -10,7 +10,10 @@ from paramove.workspace import Workspace
 NODES = "nodes: {camera: {module: nodes.camera, parameters: {source: 'device:/dev/video0', cameras: a b.yaml}}}\n"
 NEEDS = """
 needs:
-  cameras: {file: "{camera.cameras}", about: where it is, made_by: "paramove calibrate {camera.source} --out 'a b.yaml'"}
+  cameras:
+    file: "{camera.cameras}"
+    about: where it is
+    made_by: "paramove calibrate {camera.source} --out 'a b.yaml'"
   person: {file: person.yaml, about: the person, made_by: paramove webcam person}
 """
 

@@ -36,10 +36,12 @@ from paramove.supervision import (
     application,
     examined,
     load,
+    overlay_folders,
 )
 from paramove.workspace import Workspace
 
-OVERLAY = "view"
+PAGE, OWN_PAGE = "view", "page"
+"""Overlays with the page for any application, and with what an application changes of it."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +174,8 @@ def with_page(workspace: Workspace, name: str, overlays: Sequence[str] | None) -
     """The overlays of a launch file, its default ones if None, with the page's on top; and the setting of its title."""
     launch = load(workspace, name, overlays)
     title = (launch.file.description or launch.name.replace("_", " "))[:80]
-    return [*launch.overlays, OVERLAY], f"dashboard.title={json.dumps(title)}"
+    own = {OWN_PAGE} & set(workspace.names(overlay_folders(launch.name)[0]))
+    return [*launch.overlays, PAGE, *own], f"dashboard.title={json.dumps(title)}"
 
 
 class AnnouncingView:

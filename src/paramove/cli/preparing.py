@@ -28,14 +28,12 @@ def prepared(launch: Launch, workspace: Workspace, pages: Path | None) -> int:
     Raises DocumentError for a wrong entry, or a command that does not write its file.
     """
     for missing in missing_files(launch, workspace):
-        if not sys.stdin.isatty():
-            typer.echo(f"{printable(_said(missing))}; make it by\n  {printable(missing.typed)}", err=True)
+        attended, name = sys.stdin.isatty(), missing.path.name
+        typer.echo(printable(f"{name} is missing: {missing.about}"), err=not attended)
+        typer.echo(printable(f"  {missing.typed}"), err=not attended)
+        if not attended or not _agreed():
             return exit_codes.INPUT_MISSING
-        typer.echo(f"{printable(_said(missing))}\n  {printable(missing.typed)}")
-        if not _agreed():
-            return exit_codes.INPUT_MISSING
-        code = _run(missing, workspace, pages)
-        if code:
+        if code := _run(missing, workspace, pages):
             return code
         if not missing.path.exists():
             raise launch.error(("needs",), f"`{missing.typed}` did not write {missing.path}")
@@ -43,16 +41,16 @@ def prepared(launch: Launch, workspace: Workspace, pages: Path | None) -> int:
 
 
 def _run(missing: MissingFile, workspace: Workspace, pages: Path | None) -> int:
-    command = [sys.executable, "-m", "paramove.cli.main", *missing.command]
-    environment = {**os.environ, **({} if pages is None else {FOLDER_VARIABLE: str(pages)})}
+    shared = {} if pages is None else {FOLDER_VARIABLE: str(pages)}
     try:
-        return subprocess.run(command, cwd=workspace.root, env=environment, check=False).returncode
+        return subprocess.run(
+            [sys.executable, "-m", "paramove.cli.main", *missing.command],
+            cwd=workspace.root,
+            env={**os.environ, **shared},
+            check=False,
+        ).returncode
     except KeyboardInterrupt:
         return exit_codes.by_signal(signal.SIGINT)
-
-
-def _said(missing: MissingFile) -> str:
-    return f"{missing.path.name} is missing: {missing.about}"
 
 
 def _agreed() -> bool:

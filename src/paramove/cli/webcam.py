@@ -176,7 +176,7 @@ def _images(camera: CalibratedCamera, source: str, to_person: Prompts) -> Iterat
     from paramove.observation import images_of
 
     images = images_of([camera], [source])
-    return images if to_person.page is None else to_person.page.passing(images)
+    return images if to_person.page is None else to_person.page.passing(images, camera.name)
 
 
 def _at_chest(
@@ -225,7 +225,7 @@ def seen_by(
     page = prompts.page
     if images is None:
         images = images_of(cameras, sources)
-        images = images if page is None else page.passing(images)
+        images = images if page is None else page.passing(images, cameras[0].name)
     offline = not any(source.startswith("device:") for source in sources)
     found = detected_key_points(images, lambda trouble: prompts.add(trouble or "all is well again"), offline=offline)
     return found if page is None else page.drawing(found, cameras[0].name)

@@ -34,13 +34,11 @@ class SetUpPage:
         server.show({"page": {"title": title, "robot": False, **Texts().model_dump()}})
 
     def passing(
-        self, images: Iterator[tuple[CalibratedCamera, int, Image]]
+        self, images: Iterator[tuple[CalibratedCamera, int, Image]], camera_name: str
     ) -> Iterator[tuple[CalibratedCamera, int, Image]]:
-        """The same images; those of the first camera are shown on their way."""
-        first = ""
+        """The same images; those of this camera are shown on their way."""
         for camera, captured_ns, image in images:
-            first = first or camera.name
-            if camera.name == first:
+            if camera.name == camera_name:
                 self.show(image)
             yield camera, captured_ns, image
 
@@ -51,11 +49,11 @@ class SetUpPage:
             self._server.show({}, encoded.tobytes() if done else None)
 
     def drawing(
-        self, key_points: Iterator[tuple[str, int, BodyKeyPoints]], camera: str
+        self, key_points: Iterator[tuple[str, int, BodyKeyPoints]], camera_name: str
     ) -> Iterator[tuple[str, int, BodyKeyPoints]]:
         """The same key points; the arms in the images of this camera are drawn over its image on their way."""
         for name, captured_ns, points in key_points:
-            if name == camera:
+            if name == camera_name:
                 self._server.show({"arm": drawn_arms(points)})
             yield name, captured_ns, points
 
