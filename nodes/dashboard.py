@@ -1,11 +1,10 @@
 """Dashboard: shows the running application on a page in the browser, on this machine only, with a stop button.
 
 Subscribes  camera/image, objects/tracked, gestures, calibration/plane, rules, application/stage, speech,
-            relocation/goal, relocation/status, arm/joint_states, arm/safety, action/outline, every node's status
+            relocation/goal, relocation/status, arm/joint_states, arm/safety, action/outline, action/estimate,
+            every node's status
 Publishes   operator/stop   StopRequest   when a person presses stop
 """
-
-from pathlib import Path
 
 from pydantic import Field
 
@@ -15,16 +14,17 @@ from paramove.robots import RobotDescription, RobotFolder
 
 PERCEPTION = (topics.CAMERA_IMAGE, topics.OBJECTS_TRACKED, topics.GESTURES, topics.CALIBRATION_PLANE)
 DECISION = (topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH, topics.RELOCATION_GOAL, topics.RELOCATION_STATUS)
-SUBSCRIBES = (*PERCEPTION, *DECISION, topics.ARM_JOINT_STATES, topics.ARM_SAFETY, topics.ACTION_OUTLINE)
+ARM = (topics.ARM_JOINT_STATES, topics.ARM_SAFETY, topics.ACTION_OUTLINE, topics.ACTION_ESTIMATE)
+SUBSCRIBES = (*PERCEPTION, *DECISION, *ARM)
 PUBLISHES = (topics.OPERATOR_STOP,)
 
 
 class Config(NodeConfig):
-    """`port`: 0 takes a free one. `robot`: folder of its description; null: there is none, and so no stop button."""
+    """`port`: 0 takes a free one. `robot`: folder of its description; without one there is no stop button."""
 
     title: str = Field("paramove", max_length=80)
     port: int = Field(0, ge=0, le=65535)
-    robot: RobotFolder | None = Path("robot_description/hoap3")
+    robot: RobotFolder | None = None
     surface: Surface = Surface()
     texts: Texts = Texts()
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from paramove.cameras.calibration import CalibrationError, Lens, calibrate_lens, check_square
-from paramove.cameras.charuco_board import Board, BoardFinder, views_of
+from paramove.cameras.charuco_board import Board, BoardFinder
 from paramove.cameras.placement import place_camera
 from paramove.cameras.stereo import StereoRig
 from tests.cameras.board_scene import Sheet, camera, held, looking, session
@@ -20,6 +20,12 @@ POSES = {
     "above": looking((0.30, 0.10, 0.95), (0.15, 0.0, 0.0)),
 }
 LENSES = {"left": (-0.2, 0.06, 600.0), "right": (0.05, -0.02, 640.0), "above": (-0.1, 0.0, 680.0)}
+
+
+def views_of(images):
+    """The view of the board in each of the named images."""
+    finder = BoardFinder()
+    return [finder.find(image, name) for name, image in images]
 
 
 def made(name):

@@ -15,6 +15,7 @@ from paramove.bus.topics import Topic
 from paramove.dashboard.live_picture import LivePicture, NodeTable, Surface
 from paramove.dashboard.robot_shape import RobotShape
 from paramove.motion.setup import SurfaceParameters
+from paramove.msgs.action_estimate_pb2 import ActionEstimate, Location
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
@@ -198,3 +199,16 @@ def test_nodes_and_their_restarts() -> None:
     table.handle(scene.status("camera", processed=2, pid=8), 6.0)
     assert table.section(6.0)[1]["restarts"] == 1
     assert table.section(6.0)[1]["ms"] == 10.0
+
+
+def test_where_a_person_points_is_a_sentence() -> None:
+    estimate = ActionEstimate(pointed=Location(x=0.223, y=-0.045, x_deviation=0.012, y_deviation=0.008))
+    assert sections((topics.ACTION_ESTIMATE, estimate))["action"] == ""
+    estimate.actions.add(action="pointing", probability=0.9)
+    estimate.actions.add(action="reaching", probability=0.1)
+    said = sections((topics.ACTION_ESTIMATE, estimate))["action"]
+    assert said == "pointing: 22 cm forward, 4 cm to the right, ± 1.2 cm"
+    estimate.pointed.x_deviation = 0.3
+    assert "22 cm" not in sections((topics.ACTION_ESTIMATE, estimate))["action"]
+    estimate.detail = "the arm is lost"
+    assert sections((topics.ACTION_ESTIMATE, estimate))["action"] == "the arm is lost"

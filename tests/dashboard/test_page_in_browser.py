@@ -29,7 +29,7 @@ pytestmark = [
     ),
 ]
 TEXTS = Texts(
-    stages={"calibrate": "Calibrate", "learn": "Learn", "apply": "Apply", "done": "Done"},
+    stages=("calibrate", "learn", "apply", "done"),
     belongs="belongs in the opening at",
     origin="the right shoulder",
 )

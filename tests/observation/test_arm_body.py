@@ -108,18 +108,7 @@ def test_a_line_bends_back_and_down_and_nan_stays():
     assert np.isfinite(broken[1]).all()
 
 
-def test_sizes_from_a_posture():
-    larger = SIZES.scaled(1.1)
-    posture = fitted_poses(np.array([[0.0, 0, 0, 0.1, -0.1, -0.2, 0.4, 0.0, -0.1]]), larger)
-    measured = ArmSizes.from_posture(posture[0])
-    assert_allclose(measured.upper_arm, larger.upper_arm, rtol=1e-9, atol=0.0)
-    assert_allclose(measured.length, larger.length, rtol=1e-9, atol=0.0)
-    assert_allclose(measured.wrist_radius, larger.wrist_radius, rtol=1e-9, atol=0.0)
-
-
 def test_what_is_no_arm_is_refused():
-    with pytest.raises(InputError, match=r"0\.1 to 0\.6 m"):
-        ArmSizes.from_posture(np.arange(9.0))
     with pytest.raises(InputError, match="upper_arm"):
         ArmSizes(upper_arm=0.0)
     with pytest.raises(InputError, match=r"expected poses \(M, 9\)"):

@@ -7,7 +7,6 @@ one square below the checkerboard.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -262,9 +261,3 @@ def _agreeing(on_board: Floats, in_image: Floats) -> NDArray[np.bool_]:
 def _on_one_line(corner_ids: NDArray[np.int32]) -> bool:
     rows, columns = np.divmod(corner_ids, COLUMNS - 1)
     return len(set(rows.tolist())) < MIN_ROWS or len(set(columns.tolist())) < MIN_ROWS
-
-
-def views_of(images: Sequence[tuple[str, Image]]) -> list[BoardView | None]:
-    """The view of the board in each of the named images."""
-    finder = BoardFinder()
-    return [finder.find(image, name) for name, image in images]

@@ -6,6 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
+from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
@@ -16,6 +17,8 @@ from paramove.objects import HomographyError, PlaneHomography
 MAX_SPEECH = 12
 MAX_RESULTS = 8
 POINTING_DISPLAY_S = 3.0
+POINTING_KNOWN_CM = 6.0
+"""Standard deviation of a target from which on it is shown."""
 _ENDED = frozenset({RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED})
 _PUTS_DOWN = frozenset({RelocationGoal.KIND_RELOCATE, RelocationGoal.KIND_PLACE_HELD})
 _GESTURES = {
@@ -55,6 +58,7 @@ class Estimates:
         self._rules: dict[str, dict[str, Any]] = {}
         self._objects: dict[str, _Object] = {}
         self._pointed = ("", 0.0)
+        self._action = ""
         self._plane: PlaneHomography | None = None
         self._goal: RelocationGoal | None = None
         self._goal_s = 0.0
@@ -108,6 +112,10 @@ class Estimates:
             if gesture.located and known.state != "gone":
                 known.put = None  # it was detected elsewhere than where the robot put it
 
+    def on_action(self, estimate: ActionEstimate, now_s: float) -> None:
+        """What a person's arm does, and where it points."""
+        self._action = estimate.detail or _sentence_of(estimate)
+
     def on_goal(self, goal: RelocationGoal, now_s: float) -> None:
         """Goal of the arm, which is published again until it is acknowledged."""
         if self._goal is None or goal.id != self._goal.id:
@@ -142,6 +150,7 @@ class Estimates:
         return {
             "stage": self._stage,
             "words": list(self._speech),
+            "action": self._action,
             "objects": {name: self._object(name) for name in sorted(self._objects)},
             "pointed": self._pointed[0] if now_s - self._pointed[1] < POINTING_DISPLAY_S else "",
             "goal": self._goal_section(),
@@ -224,6 +233,18 @@ class Estimates:
             return {}
         corners = [[round(float(value), 5) for value in row] for row in plane.correspondences]
         return {"z": plane.plane_z, "corners": corners, "plane_from_image": plane.plane_from_image_matrix.tolist()}
+
+
+def _sentence_of(estimate: ActionEstimate) -> str:
+    likeliest = max(estimate.actions, key=lambda one: one.probability, default=None)
+    if likeliest is None:
+        return ""
+    name, at = likeliest.action.replace("_", " "), estimate.pointed
+    off_cm = 100.0 * max(at.x_deviation, at.y_deviation)
+    if off_cm > POINTING_KNOWN_CM:
+        return f"{name}: it is not known yet where to"
+    side = "left" if at.y >= 0.0 else "right"
+    return f"{name}: {100.0 * at.x:.0f} cm forward, {100.0 * abs(at.y):.0f} cm to the {side}, ± {off_cm:.1f} cm"
 
 
 def _position_2d(position: tuple[float, float] | None) -> list[float] | None:

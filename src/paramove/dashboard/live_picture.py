@@ -89,14 +89,14 @@ class Texts(BaseModel):
     """Words of the application.
 
     Attributes:
-        stages: Name of a stage of the application: how the page calls it, in their order.
+        stages: Names of the application's stages, in their order.
         belongs: Head of the column with the positions that the rules give.
         origin: Where positions are measured from.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    stages: dict[str, str] = {}
+    stages: tuple[str, ...] = ()
     belongs: str = "belongs at"
     origin: str = "the robot's base"
 
@@ -144,6 +144,7 @@ class LivePicture:
             topics.CALIBRATION_PLANE.name: estimates.on_plane,
             topics.OBJECTS_TRACKED.name: estimates.on_tracked,
             topics.GESTURES.name: estimates.on_gesture,
+            topics.ACTION_ESTIMATE.name: estimates.on_action,
             topics.RELOCATION_GOAL.name: estimates.on_goal,
             topics.RELOCATION_STATUS.name: estimates.on_goal_status,
         }

@@ -12,12 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations.body_frame import chain_length
 from paramove.documents import Floats, InputError, Ints, read_arrays
-
-Bools = NDArray[np.bool_]
 
 VARIABLE = "PARAMOVE_DATA"
 RATE_HZ = 50.0

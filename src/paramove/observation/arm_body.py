@@ -7,7 +7,7 @@ pose includes the wrist.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,26 +69,6 @@ class ArmSizes:
     def scaled(self, factor: float) -> ArmSizes:
         """The same arm, larger by `factor` in all its sizes."""
         return ArmSizes(*(factor * getattr(self, field.name) for field in fields(self)))
-
-    @classmethod
-    def from_posture(cls, posture: ArrayLike) -> ArmSizes:
-        """Sizes from measured postures (9,) or (M, 9), m: medians of the lengths; the rest is the default's, scaled.
-
-        The measured length from elbow to fingertip is divided between forearm and hand as in the default; the thickness
-        of all parts grows with the length of the arm. Raises InputError for lengths that no arm has.
-        """
-        points = np.atleast_2d(np.asarray(posture, dtype=np.float64)).reshape(-1, 3, 3)
-        upper = float(np.median(np.linalg.norm(points[:, 1] - points[:, 0], axis=1)))
-        lower = float(np.median(np.linalg.norm(points[:, 2] - points[:, 1], axis=1)))
-        if not (0.1 < upper < 0.6 and 0.15 < lower < 0.9):
-            raise InputError(
-                "expected an arm of 0.1 to 0.6 m from shoulder to elbow and 0.15 to 0.9 m from elbow to fingertip, "
-                f"found {upper:.3f} m and {lower:.3f} m: are the points shoulder, elbow, fingertip, in m?"
-            )
-        default = cls()
-        forearm_fraction = default.forearm / default.lower_arm
-        scaled = default.scaled((upper + lower) / default.length)
-        return replace(scaled, upper_arm=upper, forearm=forearm_fraction * lower, hand=(1.0 - forearm_fraction) * lower)
 
 
 def fitted_poses(poses: ArrayLike, sizes: ArmSizes) -> Floats:

@@ -36,16 +36,16 @@ const SHOW = {
     document.title = `${content.title} – paramove`;
     document.body.classList.toggle("without-robot", !content.robot);
     text($("belongs"), content.belongs);
-    $("stages").replaceChildren(...Object.values(content.stages).map((label) => {
+    $("stages").replaceChildren(...content.stages.map((stage) => {
       const item = document.createElement("li");
-      item.textContent = label;
+      item.textContent = stage[0].toUpperCase() + stage.slice(1);
       return item;
     }));
     SHOW.stage(state.stage ?? {});
     showRules(state.objects ?? {});
   },
   stage(content) {
-    const stages = Object.keys(state.page?.stages ?? {}), now = stages.indexOf(content.stage), last = stages.length - 1;
+    const stages = state.page?.stages ?? [], now = stages.indexOf(content.stage), last = stages.length - 1;
     $("stages").querySelectorAll("li").forEach((item, index) => {
       item.className = index < now || (index === now && now === last) ? "past" : index === now ? "now" : "";
       if (index === now) item.setAttribute("aria-current", "step"); else item.removeAttribute("aria-current");
@@ -57,6 +57,7 @@ const SHOW = {
     text($("clock"), `${Math.floor(content / 60)}:${String(Math.floor(content % 60)).padStart(2, "0")}`);
   },
   words(content) { if (content.length) text($("sentence"), content.at(-1).sentence); },
+  action(content) { if (content && !state.words?.length) text($("sentence"), content); },
   objects(content) { showRules(content); },
   pointed() { showRules(state.objects ?? {}); },
   goal(content) {
