@@ -1,5 +1,7 @@
 """A movement of the arm from the key points of one and of two cameras."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -72,6 +74,14 @@ def test_exchanged_sides_are_found(poses):
     clear = clean.sides[0] < 2
     assert (found.sides[0] == np.where(swapped, 1 - clean.sides[0], clean.sides[0]))[clear].mean() > 0.9
     assert np.median(np.linalg.norm(found.fingertip - clean.fingertip, axis=1)) < 0.02
+
+
+def test_a_lens_that_distorts_changes_little(poses):
+    lenses = [replace(one, distortion=np.array([-0.25, 0.06, 0.001, -0.001, 0.0])) for one in cameras(2)]
+    rng = np.random.default_rng(0)
+    found = reconstructed(lenses, times(poses), [key_points(poses, lens, rng) for lens in lenses])
+    plain = reconstructed(cameras(2), times(poses), shown(poses, 2))
+    assert np.median(np.linalg.norm(found.fingertip - plain.fingertip, axis=1)) < 0.02
 
 
 def test_images_may_be_missing(poses):

@@ -1,5 +1,7 @@
 """A simulated person measured from key points of one camera."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,6 +67,14 @@ def test_the_network_s_belief_of_the_size_does_not_matter(poses):
     ]
     found, plain = measured_arm(CAMERA, points, distance=DISTANCE), measured_arm(CAMERA, seen(poses), distance=DISTANCE)
     np.testing.assert_allclose(found.resting, plain.resting, rtol=0.0, atol=1e-9)
+
+
+def test_a_lens_that_distorts_changes_nothing(poses):
+    lens = replace(CAMERA, distortion=np.array([-0.25, 0.06, 0.001, -0.001, 0.0]))
+    through = measured_arm(lens, key_points(poses, lens, np.random.default_rng(0), EXACT), distance=DISTANCE)
+    plain = measured_arm(CAMERA, seen(poses), distance=DISTANCE)
+    np.testing.assert_allclose(through.resting, plain.resting, rtol=0.0, atol=0.01)
+    assert through.upper_arm == pytest.approx(plain.upper_arm, abs=0.005)
 
 
 def test_too_few_images_and_impossible_lengths_are_errors(poses):
