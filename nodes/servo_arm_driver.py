@@ -12,7 +12,7 @@ Publishes   arm/joint_states        foxglove.JointStates   15 Hz   rad
             arm/motors              MotorStatus            1 Hz
 """
 
-from paramove.bus import Bus, NodeConfig, Tick, main, topics
+from paramove.bus import TICK_PERIOD_NS, Bus, NodeConfig, Tick, main, topics
 from paramove.robots import RobotFolder, ThisLaunch
 from paramove.robots.dynamixel import DrivenArm, ServoArmSetup
 
@@ -30,15 +30,20 @@ class Config(NodeConfig, ServoArmSetup):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the arm then comes to rest."""
     launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
-    with config.driven_arm(bus.run_folder, launch) as arm:
+    paced_in = bus.settings.folder if bus.settings.lockstep else None
+    with config.driven_arm(bus.run_folder, launch, paced_in) as arm:
         bus.when_readable(arm.readable, lambda: publish_all(bus, arm))
+        bus.ready(arm.detail)
         handle = {
             topics.ARM_TRAJECTORY: arm.on_trajectory,
             **dict.fromkeys(topics.ARMINGS, arm.on_arm_request),
             **dict.fromkeys(topics.STOPS, arm.on_stop),
         }
         for event in bus.events(*SUBSCRIBES, tick=True):
-            if not isinstance(event, Tick):
+            if isinstance(event, Tick):
+                arm.run_to(event.now_ns + TICK_PERIOD_NS)
+                publish_all(bus, arm)
+            else:
                 handle[event.topic](event.message, event.captured_ns)
             bus.degraded(arm.trouble) if arm.trouble else bus.ready(arm.detail)
 

@@ -39,6 +39,7 @@ class EmulatedArm:
         seed: Seed of communication faults.
         held: Whether torque is on at the start, as left by an earlier program; otherwise the arm falls at once.
         servo_rules_only: Whether the checker reports only packets that the servos themselves reject.
+        paced: Whether time stands still until the emulator's `run_to`.
     """
 
     def __init__(
@@ -51,7 +52,10 @@ class EmulatedArm:
         seed: int = 0,
         held: bool = False,
         servo_rules_only: bool = False,
+        *,
+        paced: bool = False,
     ) -> None:
+        self._paced = paced
         pose = dict(zip(robot.joint_names, robot.base_pose.tolist(), strict=True))
         for name, degrees in (posture_deg or {}).items():
             pose[robot.joint_names[robot.index(name)]] = float(np.deg2rad(degrees))
@@ -76,7 +80,9 @@ class EmulatedArm:
         with contextlib.ExitStack() as opened, _as_input_errors():
             if self._link is not None:
                 self._link.parent.mkdir(parents=True, exist_ok=True)
-            emulator = DynamixelEmulator(self._servos, self._link, self.mechanics, self._servo_rules_only)
+            emulator = DynamixelEmulator(
+                self._servos, self._link, self.mechanics, self._servo_rules_only, paced=self._paced
+            )
             self.emulator = opened.enter_context(emulator)
             self.emulator.faults = WireFaults(seed=self._seed)
             with self.emulator.lock:

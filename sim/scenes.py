@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from paramove.robots import RobotDescription
+from paramove.robots.dynamixel import PACING_SOCKET
 from sim import looks, tool_box
 from sim.camera import ImageSource, RobotCamera, ViewForPeople
 from sim.hoap3 import Hoap3
@@ -13,6 +15,7 @@ from sim.looks import Looks
 from sim.person import Person
 from sim.place_instructor import OBJECT, START, PlaceInstructor
 from sim.pointing_world import PointingWorld
+from sim.servo_arm_world import ServoArmWorld
 from sim.simulation import Simulated, Simulation
 from sim.tracked_person import TrackedPerson, world_from_table
 from sim.world import World
@@ -21,13 +24,18 @@ if TYPE_CHECKING:
     from sim.simulator import Config
 
 
-def build(options: Config, firmware_log: BinaryIO | None = None) -> Simulated:
+def build(options: Config, run_folder: Path, bus_folder: Path, firmware_log: BinaryIO | None = None) -> Simulated:
     """The scene that the options name.
 
     Args:
         options: See `sim.simulator.Config`.
+        run_folder: That the name of a port starts from.
+        bus_folder: Of the socket by which a servo arm's driver paces the world.
         firmware_log: Gets every frame that the robot's firmware plays, 28 little-endian int16 a millisecond.
     """
+    if options.scene == "servo_arm":
+        robot = RobotDescription.load(options.robot)
+        return ServoArmWorld(robot, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed)
     if options.scene == "pointing":
         return PointingWorld(options.seed, options.targets, options.views, options.markers)
     return at_the_tool_box(options, firmware_log)

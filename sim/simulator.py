@@ -54,11 +54,13 @@ FIRMWARE_LOG = "firmware_frames.int16"
 _log = logging.getLogger(__name__)
 
 
-Scene = Literal["rule_learning", "rule_learning_whole_arm", "relocate_by_pointing", "pointing"]
+Scene = Literal["rule_learning", "rule_learning_whole_arm", "relocate_by_pointing", "pointing", "servo_arm"]
 Marker = Literal["shoulder", "elbow", "wrist", "index"]
 OF_SCENES: Mapping[frozenset[str], frozenset[str]] = {
     frozenset({"targets", "views", "markers"}): frozenset({"pointing"}),
-    frozenset({"robot", "camera", "video", "measures"}): frozenset(get_args(Scene)) - {"pointing"},
+    frozenset({"robot"}): frozenset(get_args(Scene)) - {"pointing"},
+    frozenset({"camera", "video", "measures"}): frozenset(get_args(Scene)) - {"pointing", "servo_arm"},
+    frozenset({"port"}): frozenset({"servo_arm"}),
     frozenset({"arm_image_every"}): frozenset({"rule_learning_whole_arm", "relocate_by_pointing"}),
 }
 """Parameters that not every scene has."""
@@ -72,6 +74,7 @@ class Config(NodeConfig):
             `rule_learning_whole_arm`: the instructor is a whole arm, which two calibrated cameras see.
             `relocate_by_pointing`: HOAP-3 with one object, and a person who points at free places.
             `pointing`: a person alone at a table, who points.
+            `servo_arm`: emulated servos that move an arm in the scene next to its model; only in lockstep.
         seed: Of everything random in the world.
         robot: Folder of the robot's description.
         camera: Whether cameras' images are rendered; without, no graphics library is needed.
@@ -82,6 +85,7 @@ class Config(NodeConfig):
         targets: Of `pointing`: how often the person points.
         views: Of `pointing`: which cameras look, from 1.
         markers: Of `pointing`: points of the arm at which the person wears coloured balls.
+        port: Of `servo_arm`: link to the serial port, relative to the run's folder.
         max_duration_s: Simulated time after which the run ends.
         pace: Simulated seconds per second when nobody waits for anybody (not in lockstep).
         firmware_log: Whether every frame that the firmware plays is written to the run folder (56 kB/s), for those who
@@ -98,6 +102,7 @@ class Config(NodeConfig):
     targets: int = Field(default=5, ge=1, le=100)
     views: tuple[int, ...] = Field(default=(1, 2), min_length=1, max_length=4)
     markers: tuple[Marker, ...] = ()
+    port: Path = Path("by-id/usb-paramove_emulated_servos-if00-port0")
     max_duration_s: float = Field(default=600.0, gt=0)
     pace: float = Field(default=1.0, gt=0)
     firmware_log: bool = False
@@ -118,7 +123,7 @@ def run(bus: Bus, config: Config) -> None:
         log = None
         if config.firmware_log:  # without a buffer: nothing is lost when the process is killed
             log = open_files.enter_context((bus.run_folder / FIRMWARE_LOG).open("xb", buffering=0))
-        simulation = build(config, log)
+        simulation = build(config, bus.run_folder, bus.settings.folder, log)
         open_files.callback(simulation.close)
         simulation.write_measures(bus.run_folder)
         _loop(bus, config, simulation)

@@ -59,6 +59,9 @@ def _emulate(words: list[str]) -> int:
     parser.add_argument(
         "--servo-rules-only", action="store_true", help="report only packets that servos reject, not jumps of the goal"
     )
+    parser.add_argument(
+        "--paced", action="store_true", help="time stands still until `fault run NANOSECONDS`, counted from the start"
+    )
     options = parser.parse_args(words)
     chain = chain_of(options.servos, options.baud_rate)
     joints = chain.joints()
@@ -72,7 +75,9 @@ def _emulate(words: list[str]) -> int:
     with contextlib.ExitStack() as opened:
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals)
         opened.callback(signal.pthread_sigmask, signal.SIG_SETMASK, mask)
-        emulator = opened.enter_context(DynamixelEmulator(servos, options.port, mechanics, options.servo_rules_only))
+        emulator = opened.enter_context(
+            DynamixelEmulator(servos, options.port, mechanics, options.servo_rules_only, paced=options.paced)
+        )
         faults = FaultCommands(emulator, chain.numbers, dict(zip(chain.numbers.values(), joints, strict=True)))
         opened.enter_context(ControlSocket(control_of(options.port), faults.do))
         sys.stdout.write(

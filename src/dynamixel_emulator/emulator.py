@@ -34,6 +34,8 @@ MAX_LAG_S = 0.02
 """Maximum delay of the servos' time behind real time; time lost beyond it is dropped."""
 REAL_TIME = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
 MAX_BYTES = 4096
+HALF_STEP_S = 0.0005
+"""Of the mechanics: sums of steps are not exact."""
 TCGETS2 = 0x802C542A
 """Reads terminal settings with numeric baud rates (Linux, asm-generic/ioctls.h). Python's `termios` reads only the
 predefined rates, which pyserial sets; programs in Rust set numeric ones."""
@@ -56,6 +58,8 @@ class DynamixelEmulator:
         mechanics: Mechanics that the servos move, in the same order; without, the servos have no load.
         servo_rules_only: Whether the checker reports only packets that the servos themselves reject, not jumps of the
             goal, which are common in third-party programs.
+        paced: Whether time stands still until `run_to`: requests take no time, and a program that paces it has the
+            same run again on any machine, faster than the clock.
 
     Raises:
         EmulatorError: The path of the link is another file, its folder is missing, or another emulator serves it.
@@ -72,7 +76,10 @@ class DynamixelEmulator:
         link: Path | None = None,
         mechanics: Mechanics | None = None,
         servo_rules_only: bool = False,
+        *,
+        paced: bool = False,
     ) -> None:
+        self.paced = paced
         self.bus = EmulatedBus(servos, mechanics, servo_rules_only)
         self.faults = WireFaults()
         self.lock = threading.Lock()
@@ -106,6 +113,15 @@ class DynamixelEmulator:
         """Raises RuntimeError if the thread that serves the port has failed."""
         if self._error is not None:
             raise RuntimeError(f"the emulated servos have stopped: {self._error}") from self._error
+
+    def run_to(self, time_ns: int) -> None:
+        """Lets servos and world run to a time since the start, if it is paced, and in the future; hold the lock.
+
+        Raises EmulatorError if time runs by itself.
+        """
+        if not self.paced:
+            raise EmulatorError("the time of this emulator runs by itself: start it as paced")
+        self.bus.run_to(max(self.bus.now_s, 1e-9 * time_ns + HALF_STEP_S))
 
     def unplug(self) -> None:
         """Removes the port, as if its plug were pulled; the servos keep their power and continue."""
@@ -166,6 +182,9 @@ class DynamixelEmulator:
             if self._plug_requested != self.plugged_in:
                 self._open() if self._plug_requested else self._close()
                 self._plug_changed.set()
+            if self.paced:
+                self._reply_at_once()
+                continue
             lag_s = self._now_s() - dropped_s - self.bus.now_s
             received, now_s = self._read(max(0.0, min(IDLE_S, IDLE_S - lag_s))), self._now_s()
             with self.lock:
@@ -177,6 +196,13 @@ class DynamixelEmulator:
                 replies = self.bus.receive(received, self.baud_rate, now_s) if received else []
             if received:
                 self._send(received, self.faults.apply(received, replies), now_s)
+
+    def _reply_at_once(self) -> None:
+        received = self._read(IDLE_S)
+        with self.lock:
+            replies = self.bus.receive(received, self.baud_rate, self.bus.now_s) if received else []
+        for _, reply in self.faults.apply(received, replies):
+            self._write(reply)
 
     def _read(self, timeout_s: float) -> bytes:
         """Bytes from the client; waits at most this time for them."""
@@ -209,8 +235,11 @@ class DynamixelEmulator:
             wait_s = line_free_s - self._now_s()
             if wait_s > 0.0:
                 self._stopped.wait(wait_s)
-            with contextlib.suppress(BlockingIOError):  # unread replies are dropped when the port is full
-                os.write(self._master, reply)
+            self._write(reply)
+
+    def _write(self, reply: bytes) -> None:
+        with contextlib.suppress(BlockingIOError):  # unread replies are dropped when the port is full
+            os.write(self._master, reply)
 
 
 def _set_priority(real_time: bool) -> None:

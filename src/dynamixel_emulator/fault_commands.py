@@ -198,6 +198,11 @@ def _plug_in(commands: FaultCommands, words: list[str]) -> str:
     return commands.emulator.port
 
 
+def _run(commands: FaultCommands, words: list[str]) -> str:
+    commands.emulator.run_to(int(_number(words[0])))
+    return ""
+
+
 def _state(commands: FaultCommands, words: list[str]) -> str:
     """JSON with the port, the servos and the checker's counts."""
     registers = ("Present Position", "Goal Position", "Torque Enable", "Hardware Error Status", "Bus Watchdog")
@@ -251,6 +256,7 @@ COMMANDS: dict[str, tuple[str, Callable[[FaultCommands, list[str]], str]]] = {
     "faults": ("faults [NAME=VALUE]", _faults),
     "unplug": ("unplug", _unplug),
     "plug_in": ("plug_in", _plug_in),
+    "run": ("run NANOSECONDS", _run),
     "state": ("state", _state),
     "findings": ("findings", _findings),
 }

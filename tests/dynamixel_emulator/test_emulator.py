@@ -434,3 +434,32 @@ def test_a_link_is_removed_before_its_terminal_is_closed(tmp_path, monkeypatch):
         emulator.unplug()
         assert link_exists[:2] == [False, False]
         monkeypatch.undo()
+
+
+def test_a_paced_emulator_moves_only_when_its_time_runs():
+    """The same request at the same time has the same answer, whatever the clock on the wall."""
+    positions = []
+    for _ in range(2):
+        with DynamixelEmulator([EmulatedServo("xl430_w250", 1)], paced=True) as emulator:
+            client = Client(emulator)
+            assert client.write(1, TORQUE, 1) == 0
+            assert client.write(1, GOAL, 3000, 4) == 0
+            run = []
+            for period in range(1, 21):
+                with emulator.lock:
+                    emulator.run_to(10_000_000 * period)
+                run.append(client.read(1, PRESENT))
+            assert client.read(1, PRESENT) == run[-1], "time stands still"
+            with emulator.lock:
+                emulator.run_to(10_000_000)
+            assert client.read(1, PRESENT) == run[-1], "time does not run back"
+            client.port.closePort()
+        positions.append(run)
+    assert positions[0] == positions[1]
+    assert positions[0] == sorted(positions[0])
+    assert positions[0][0] < positions[0][-1]
+
+
+def test_time_that_runs_by_itself_cannot_be_paced(client):
+    with pytest.raises(EmulatorError, match="paced"), client.emulator.lock:
+        client.emulator.run_to(1)

@@ -10,6 +10,7 @@ from .bus.bench import BusBench as BusBench
 from .bus.bench import bench_bus as bench_bus
 from .bus.bench import latency_timer_ms as latency_timer_ms
 from .bus.bench import slow_timer as slow_timer
+from .bus.clock import PACING_SOCKET as PACING_SOCKET
 from .bus.hardware_error import error_text as error_text
 from .bus.hardware_error import hardware_errors as hardware_errors
 from .bus.packets import Instruction as Instruction

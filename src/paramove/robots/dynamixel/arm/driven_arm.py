@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import time
 from collections.abc import Iterator
 from types import TracebackType
 from typing import Any, Self
@@ -58,7 +57,7 @@ class DrivenArm:
             following=following,
             emergency_timeout_ms=EMERGENCY_MS if settings.stop_inputs.are_there else None,
         )
-        self._caution = settings.caution
+        self._caution, self._clock = settings.caution, port.clock
         self._driver = ArmDriver(description, safety, self_collision(description), settings.why_no_program)
         self.readable, self._written = os.pipe2(os.O_NONBLOCK)
         self._loop = ServoLoop(self._driver, description, servos, port, settings, self._wake)
@@ -112,11 +111,19 @@ class DrivenArm:
             self._driver.on_stop(message, captured_ns)
         self._loop.tick()
 
+    def run_to(self, time_ns: int) -> None:
+        """Drive the arm up to a time, if it is an emulator's; else the arm is driven by itself.
+
+        Raises:
+            ClockLostError: The emulator has ended.
+        """
+        self._loop.run_to(time_ns)
+
     def said(self) -> Iterator[tuple[Topic, Any, int]]:
         """What is to be published since the last call: topic, message, and the time of its data, ns."""
         with contextlib.suppress(BlockingIOError):
             os.read(self.readable, 4096)
-        output, now_ns = self._loop.take(), time.monotonic_ns()
+        output, now_ns = self._loop.take(), self._clock.now_ns
         states = [one.joint_states for one in output if one.joint_states is not None]
         yield from ((topics.ARM_JOINT_STATES_FAST, one, one.timestamp.ToNanoseconds()) for one in states)
         yield from ((topics.ARM_TRAJECTORY_STATUS, status, now_ns) for one in output for status in one.statuses)

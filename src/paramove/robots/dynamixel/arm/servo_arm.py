@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -62,7 +61,7 @@ class ArmReading:
     """The latest data of the servos; arrays [J].
 
     Attributes:
-        at_ns: When the latest reply came, of the monotonic clock.
+        at_ns: When the latest reply came, by the port's clock.
         counts: Positions, pulses; there is no reading before all joints have replied.
         ages_s: Of each joint's latest reply.
     """
@@ -101,7 +100,7 @@ class ServoArm:
         self.servos = tuple(servos)
         self.health = {servo.joint: ServoHealth() for servo in servos}
         self.holds = False
-        self._chain = chain
+        self._chain, self._clock = chain, chain.port.clock
         self._period_s = period_s
         self._timeouts = timeouts or Timeouts()
         self._turns = [0 for _ in servos]
@@ -117,7 +116,7 @@ class ServoArm:
         if faults:
             return faults
         self._watch.jump = None
-        fault = bus_fault(self.measured, self._timeouts.read_s or self._period_s) or self._fault_of_jump()
+        fault = bus_fault(self.measured, self._timeouts.read_s or self._period_s, self._clock) or self._fault_of_jump()
         return () if fault is None else (fault,)
 
     def take_hold(self) -> tuple[Fault, ...]:
@@ -164,10 +163,10 @@ class ServoArm:
 
     def _position(self, number: int, torque: bool) -> int:
         """Position of a servo, with the attempts of any read. Raises ServoError."""
-        asked_ns = time.monotonic_ns()
+        asked_ns = self._clock.now_ns
         position = self._chain.read(number, self._registers[POSITION])
         self._watch.jump = None
-        if not self._watch.accepts(number, position, (asked_ns, time.monotonic_ns()), torque=torque):
+        if not self._watch.accepts(number, position, (asked_ns, self._clock.now_ns), torque=torque):
             raise ServoError(number, f"servo {number} {self._watch.jump}: check cable, plugs and supply, and arm again")
         return position
 
@@ -214,7 +213,7 @@ class ServoArm:
         known = [answer for answer in latest if answer is not None]
         if len(known) < len(latest):
             return None
-        now_ns = time.monotonic_ns()
+        now_ns = self._clock.now_ns
         positions = [answer.values[POSITION] for answer in known]
         for joint, (servo, position) in enumerate(zip(self.servos, positions, strict=True)):
             if servo.number not in held:  # while it holds, they stay the same

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from paramove.robots.dynamixel.bus.clock import Clock
 from paramove.robots.dynamixel.bus.hardware_error import hardware_errors
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, ServoModel
@@ -87,13 +87,13 @@ def arming_faults(servos: Sequence[JointServo], chain: ServoChain) -> tuple[Faul
     return tuple(fault for servo in servos for fault in _faults_of(servo, chain))
 
 
-def bus_fault(read_all: Callable[[], object], period_s: float) -> Fault | None:
+def bus_fault(read_all: Callable[[], object], period_s: float, clock: Clock) -> Fault | None:
     """Whether all servos can be read once in every period of the loop."""
     times_s = []
     for _ in range(ROUND_TRIPS):
-        begun_s = time.monotonic()
+        begun_ns = clock.now_ns
         read_all()
-        times_s.append(time.monotonic() - begun_s)
+        times_s.append(1e-9 * (clock.now_ns - begun_ns))
     median_s = float(np.median(times_s))
     if median_s <= period_s:
         return None

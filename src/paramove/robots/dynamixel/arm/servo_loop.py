@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -23,6 +22,7 @@ from paramove.robots import RESTARTED, RobotDescription, ThisLaunch
 from paramove.robots.dynamixel.arm.servo_arm import ArmReading, Counts, ServoArm, Timeouts
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
+from paramove.robots.dynamixel.bus.clock import ClockLostError, EmulatorClock
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_port import PortLostError, ServoPort
 from paramove.robots.streaming import ArmDriver, DriverOutput, StreamReader
@@ -86,7 +86,7 @@ class LoopSettings:
 
 
 class ServoLoop:
-    """An arm that is driven while this is a context.
+    """An arm that is driven while this is a context: in a thread of its own, or by `run_to` in an emulator's time.
 
     Args:
         driver: Trajectories through the gate.
@@ -118,7 +118,8 @@ class ServoLoop:
         """Held while the loop uses the driver; hold it to call the driver."""
         self._description = description
         self._period_s = 1e-6 * description.stream.period_us
-        self._port = port
+        self._period_ns = 1000 * description.stream.period_us
+        self._port, self._clock = port, port.clock
         self._servos = servos
         self._settings = settings
         self._on_output = on_output
@@ -126,12 +127,18 @@ class ServoLoop:
         self._reader: StreamReader | None = None
         self._output: list[DriverOutput] = []
         self._step = 0
-        self._begun_s, self._pause_s = time.monotonic(), 0.0
+        self._begun_s, self._pause_s = self._now_s, 0.0
         self._urgent = self._ended = self._normal_end = False
         self._tick_steps = max(1, round(TICK_S / self._period_s))
         self._reopen_s = 0.0
+        self._paced = isinstance(port.clock, EmulatorClock)
+        self._due_ns = self._period_ns
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="servo_loop", daemon=True)
+
+    @property
+    def _now_s(self) -> float:
+        return 1e-9 * self._clock.now_ns
 
     @property
     def arm(self) -> ServoArm:
@@ -140,7 +147,8 @@ class ServoLoop:
 
     def __enter__(self) -> Self:
         self._open()
-        self._thread.start()
+        if not self._paced:
+            self._thread.start()
         return self
 
     def __exit__(
@@ -148,7 +156,11 @@ class ServoLoop:
     ) -> None:
         self._normal_end = kind is None
         self._stopped.set()
-        self._thread.join()
+        if isinstance(self._clock, EmulatorClock):
+            self._run()
+            self._clock.close()
+        else:
+            self._thread.join()
         self._port.close()
 
     def take(self) -> list[DriverOutput]:
@@ -157,10 +169,21 @@ class ServoLoop:
             output, self._output = self._output, []
         return output
 
+    def run_to(self, time_ns: int) -> None:
+        """All periods up to a time, in the thread of the caller, if the clock is that of an emulator.
+
+        Raises ClockLostError when the emulator has ended.
+        """
+        while self._paced and self._due_ns <= time_ns:
+            self._clock.wait_until(self._due_ns)
+            self._due_ns += self._period_ns
+            with self.lock:
+                self._one_period()
+
     def tick(self) -> None:
         """Run the driver's logic at once: a stop does not wait for the next period."""
         with self.lock:
-            self._tick(time.monotonic_ns())
+            self._tick(self._clock.now_ns)
 
     @property
     def has_failed(self) -> bool:
@@ -169,14 +192,14 @@ class ServoLoop:
 
     def _run(self) -> None:
         try:
-            due_s = time.monotonic()
+            due_s = self._now_s
             while not self._stopped.is_set():
                 # Lost periods are not made up for.
-                due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)
+                due_s = max(due_s + self._period_s, self._now_s - self._period_s)
                 with self.lock:
                     self._one_period()
                 self._on_output()
-                self._stopped.wait(max(REST_S, due_s - time.monotonic()))
+                self._stopped.wait(max(REST_S, due_s - self._now_s))
             rests = self._normal_end and self._settings.rest is not None and self._goes_to(self._settings.rest)
             with self.lock:
                 self._end(rests)
@@ -184,7 +207,7 @@ class ServoLoop:
             self._ended = True
 
     def _one_period(self) -> None:
-        begun_s, self._begun_s = self._begun_s, time.monotonic()
+        begun_s, self._begun_s = self._begun_s, self._now_s
         self._pause_s = self._begun_s - begun_s
         self._look_at_emergency_stop()
         try:
@@ -194,11 +217,11 @@ class ServoLoop:
                 self._move_and_read()
         except PortLostError as error:
             self.lost = str(error)
-            self._reopen_s = time.monotonic() + REOPEN_S
+            self._reopen_s = self._now_s + REOPEN_S
             self._reader = None
             self._report(Fault("port_lost", "", f"{error} The arm rests by its servos' own watchdog; arm again"))
         if self._urgent or self._step % self._tick_steps == 0:
-            self._tick(time.monotonic_ns())
+            self._tick(self._clock.now_ns)
         self._step += 1
 
     def _look_at_emergency_stop(self) -> None:
@@ -230,7 +253,7 @@ class ServoLoop:
 
     def _prepare(self) -> ArmReading | None:
         """Check the servos and let them hold their positions, before the gate gets the arming request."""
-        began_ns = time.monotonic_ns()
+        began_ns = self._clock.now_ns
         faults = self._settings.standing_faults or self._arm.check() or self._arm.take_hold()
         self.driver.on_arming_checks(faults, began_ns)
         return self._arm.measured()
@@ -266,13 +289,13 @@ class ServoLoop:
 
     def _reopen(self) -> None:
         """Under the same name, which is that of the adapter and not of its USB socket."""
-        if time.monotonic() < self._reopen_s:
+        if self._now_s < self._reopen_s:
             return
         try:
             self._open()
         except InputError as error:
             self.lost = str(error)
-            self._reopen_s = time.monotonic() + REOPEN_S
+            self._reopen_s = self._now_s + REOPEN_S
             return
         self.lost = ""
         self._arm = ServoArm(self._servos, ServoChain(self._port), self._period_s, self._settings.timeouts)
@@ -283,21 +306,21 @@ class ServoLoop:
 
     def _goes_to(self, rest: Mapping[str, float]) -> bool:
         """Go to rest, slowly and through the gate; whether the arm arrived. On any fault it does not."""
-        ends_s, name, reason = time.monotonic() + LONGEST_EXIT_S, "", "it is not armed"
+        ends_s, name, reason = self._now_s + LONGEST_EXIT_S, "", "it is not armed"
         reader = self._reader
         if reader is not None and not reader.at_rest:
             reader, reason = None, "it was moving, and stops"
         while reader is not None and not self.lost and self.driver.state is State.ARMED:
             if not name:
                 start = self._description.units.to_radians(reader.target)
-                message, duration_s = movement_to(self._description, start, rest, f"rest {time.monotonic_ns()}")
+                message, duration_s = movement_to(self._description, start, rest, f"rest {self._clock.now_ns}")
                 reason = f"it would take {duration_s:.1f} s, and a launcher would kill this driver before"
-                if time.monotonic() + duration_s + EXIT_MARGIN_S > ends_s:
+                if self._now_s + duration_s + EXIT_MARGIN_S > ends_s:
                     break
                 name, reason = message.id, "it was stopped before it arrived"
                 with self.lock:
-                    self.driver.on_trajectory(message, time.monotonic_ns())
-            elif time.monotonic() > ends_s:
+                    self.driver.on_trajectory(message, self._clock.now_ns)
+            elif self._now_s > ends_s:
                 reason = "it took too long"
                 break
             self._stopped_period()
@@ -314,10 +337,10 @@ class ServoLoop:
 
     def _stopped_period(self) -> None:
         """One more period of a loop that is ending."""
-        begun_s = time.monotonic()
+        begun_ns = self._clock.now_ns
         with self.lock:
             self._one_period()
-        time.sleep(max(0.0, begun_s + self._period_s - time.monotonic()))
+        self._clock.wait_until(begun_ns + self._period_ns)
 
     def _end(self, rests: bool) -> None:
         """Come to rest by the rows of the reader, wait for the servos, then write their final settings."""
@@ -327,15 +350,15 @@ class ServoLoop:
             while self._arm.holds and self._reader is not None:
                 self._arm.command(self._reader.play())
                 if self._reader.at_rest:
-                    stands_s = stands_s or time.monotonic()
+                    stands_s = stands_s or self._now_s
                     reading = self._arm.measured()
                     if reading is not None:
                         measured.append(reading.counts)
                     settled = len(measured) == measured.maxlen and np.ptp(measured, axis=0).max() <= 1
-                    if settled or time.monotonic() - stands_s > LONGEST_SETTLING_S:
+                    if settled or self._now_s - stands_s > LONGEST_SETTLING_S:
                         break
-                time.sleep(self._period_s)
-        except PortLostError as error:
+                self._clock.wait_until(self._clock.now_ns + self._period_ns)
+        except (PortLostError, ClockLostError) as error:
             self.lost = str(error)
         if not self.lost:
             self._let_go(self._settings.torque_off if self._settings.rest is None else rests)

@@ -9,13 +9,14 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from paramove.documents import OldNames
+from paramove.documents import InputError, OldNames
 from paramove.robots import DescriptionError, RobotDescription, ThisLaunch
 from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
 from paramove.robots.dynamixel.arm.servo_arm import Timeouts
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
+from paramove.robots.dynamixel.bus.clock import PACING_SOCKET, Clock, EmulatorClock
 from paramove.robots.dynamixel.bus.serial_adapters import serial_of
 from paramove.robots.dynamixel.bus.servo_models import CURRENT_UNIT_MA, model_named
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
@@ -75,21 +76,26 @@ class ServoArmSetup(OldNames):
     stop_line: Path | None = None
     stop_line_pressed: Literal[0, 1] = 1
 
-    def driven_arm(self, run_folder: Path, launch: ThisLaunch | None = None) -> DrivenArm:
+    def driven_arm(self, run_folder: Path, launch: ThisLaunch | None = None, paced_in: Path | None = None) -> DrivenArm:
         """The arm, not yet driven.
 
         Args:
             run_folder: That relative names start from.
             launch: That may emulate the servos; None: none does.
+            paced_in: The bus folder, with the control socket of emulated servos that this loop paces, in lockstep.
 
         Raises:
-            InputError: Its description or calibration is missing or wrong, or is another arm's.
+            InputError: Its description or calibration is missing or wrong, or is another arm's; or in lockstep its
+                servos are not emulated.
         """
         description = RobotDescription.load(self.robot)
         reason = (launch or ThisLaunch()).why_not_servos(run_folder / self.port)
         emulated = None if reason else self.emulated
         timeouts = self.timeouts if emulated is None else emulated.timeouts
-        port = servo_port(description, str(run_folder / self.port), timeouts.read_s)
+        if paced_in is not None and emulated is None:
+            raise InputError(f"lockstep needs servos that this launch emulates: {reason or 'no `emulated` is given'}")
+        pace = None if paced_in is None else EmulatorClock(paced_in / PACING_SOCKET)
+        port = servo_port(description, str(run_folder / self.port), timeouts.read_s, pace)
         calibration = None
         if self.calibration is not None:
             calibration = ArmCalibration.load(self.calibration, serial_of(self.port.name))
@@ -124,18 +130,21 @@ def calibrated(description: RobotDescription, calibration: ArmCalibration) -> Ro
     return replace(d, units=units, lower=units.lower, upper=units.upper, soft_lower=soft_lower, soft_upper=soft_upper)
 
 
-def servo_port(description: RobotDescription, name: str, read_s: float | None = None) -> ServoPort:
+def servo_port(
+    description: RobotDescription, name: str, read_s: float | None = None, clock: Clock | None = None
+) -> ServoPort:
     """The port of a described arm, closed. Raises DescriptionError for a robot without a servo bus.
 
     Args:
         description: Of the arm.
         name: Of the port.
         read_s: That reading all servos may take; None: a period of the loop.
+        clock: Of the loop; None: the machine's.
     """
     if description.bus is None:
         raise DescriptionError(f"{description.name} has no servo bus in its robot.yaml: it is driven by another node")
     return ServoPort(
-        name, description.bus.baud_rate, LATENCY_FRACTION * (read_s or 1e-6 * description.stream.period_us)
+        name, description.bus.baud_rate, LATENCY_FRACTION * (read_s or 1e-6 * description.stream.period_us), clock
     )
 
 

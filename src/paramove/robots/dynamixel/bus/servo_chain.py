@@ -86,7 +86,7 @@ class Answered:
     Attributes:
         values: Numbers.
         alert: Whether the servo has a hardware error (register 70).
-        asked_ns, at_ns: When it was asked, and when the reply was complete, of the monotonic clock.
+        asked_ns, at_ns: When it was asked, and when the reply was complete, by the port's clock.
     """
 
     values: dict[str, int]
@@ -203,10 +203,10 @@ class ServoChain:
         """As `sync_read`, but in one exchange."""
         address = min(one.address for one in registers)
         size = max(one.address + one.size for one in registers) - address
-        answers, asked_ns = {}, time.monotonic_ns()
+        answers, asked_ns = {}, self.port.clock.now_ns
         for number, packet in self._read(numbers, address, size).items():
             if (error := packet.parameters[0]) in (0, ALERT):
-                answers[number] = Answered(_values(registers, packet), error == ALERT, asked_ns, time.monotonic_ns())
+                answers[number] = Answered(_values(registers, packet), error == ALERT, asked_ns, self.port.clock.now_ns)
         return answers
 
     def sync_write(self, register: Register, values: dict[int, int]) -> None:

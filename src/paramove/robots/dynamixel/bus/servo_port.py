@@ -23,6 +23,7 @@ import serial
 
 from paramove.devices import holders, serial_remedy
 from paramove.documents import InputError
+from paramove.robots.dynamixel.bus.clock import Clock, MonotonicClock
 from paramove.robots.dynamixel.bus.packets import BEFORE_INSTRUCTION, BEFORE_LENGTH, HEADER, Packet, encoded
 from paramove.robots.dynamixel.bus.serial_adapters import default_by_id, serial_adapters
 
@@ -47,6 +48,7 @@ class ServoPort:
         name: For example /dev/ttyUSB0, or a link in /dev/serial/by-id.
         baud_rate: bit/s.
         latency_s: That a reply may take beyond the time of its bytes.
+        clock: The time of what is read; replies are awaited by the machine's in any case.
 
     Attributes:
         is_using: Whether an exchange is under way; the packet handlers set it.
@@ -55,7 +57,10 @@ class ServoPort:
         return_delay_s: That a servo may take before it replies; the longest that can be set, until it is known.
     """
 
-    def __init__(self, name: str, baud_rate: int = 1_000_000, latency_s: float = LATENCY_S) -> None:
+    def __init__(
+        self, name: str, baud_rate: int = 1_000_000, latency_s: float = LATENCY_S, clock: Clock | None = None
+    ) -> None:
+        self.clock = clock or MonotonicClock()
         self.name, self.baud_rate, self.latency_s = name, baud_rate, latency_s
         self.is_using = False
         self.low_latency = False
