@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import mujoco
@@ -13,8 +14,6 @@ from sim import tool_box
 
 PAUSE_STEPS = 50  # a pair that parts for less than this is one contact
 _NOTHING, _OBJECT, _ROBOT = 0, 1, 2
-_FINGER_SIDE = ("finger_plate", "finger_pads", "palm")
-_THUMB_SIDE = ("thumb_base", "thumb_tip")
 
 
 @dataclass
@@ -38,14 +37,19 @@ class ContactRecord:
 
 
 class ContactWatch:
-    """Classifies the contacts of a model. Geoms without a name are called by their body."""
+    """Classifies the contacts of a model. Geoms without a name are called by their body.
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    Args:
+        model: Of the world.
+        root: The robot's first body.
+        sides: Name of a geom or body -> side of the hand.
+    """
+
+    def __init__(self, model: mujoco.MjModel, root: str, sides: Mapping[str, str]) -> None:
         self.record = ContactRecord()
         self._names = [_name(model, geom) for geom in range(model.ngeom)]
-        torso = model.body("torso").id
         kind = np.full(model.ngeom, _NOTHING)
-        kind[model.body_rootid[model.geom_bodyid] == torso] = _ROBOT
+        kind[model.body_rootid[model.geom_bodyid] == model.body(root).id] = _ROBOT
         self._object_of: dict[int, str] = {}
         for colour in tool_box.COLOURS:
             geom = model.geom(colour).id
@@ -54,9 +58,9 @@ class ContactWatch:
         self._kind = kind
         self._side = {
             geom: side
-            for side, parts in (("fingers", _FINGER_SIDE), ("thumb", _THUMB_SIDE))
             for geom in range(model.ngeom)
-            if any(part in self._names[geom] for part in parts)
+            for part, side in sides.items()
+            if kind[geom] == _ROBOT and part in (self._names[geom], str(model.body(model.geom_bodyid[geom]).name))
         }
         self._last_seen: dict[tuple[int, int], int] = {}
         self._step = 0
@@ -94,7 +98,7 @@ class ContactWatch:
                 sides.setdefault(touched, set()).add(self._side.get(robot, "other"))
                 if -dist > record.deepest:
                     record.deepest, record.deepest_pair = -dist, self.name_of((robot, other))
-        held = [name for name, touching in sides.items() if {"fingers", "thumb"} <= touching]
+        held = [name for name, touching in sides.items() if len(touching - {"other"}) > 1]
         if held:
             self._held = held[0]
         elif self._held not in sides:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -32,7 +32,7 @@ class EmulatedArm:
 
     Args:
         robot: A robot with servos in its joints; the motor names are servo models.
-        scene: World of the arm, MJCF, or the name of a file next to the arm's own model.
+        scene: World of the arm: MJCF, the name of a file next to the arm's own model, or a model with its state.
         link: Path of the port; missing folders are created.
         control: Path of the control socket for `FaultCommands`; None: no socket.
         posture_deg: Initial joint positions by name, degrees; other joints start in the base pose.
@@ -40,12 +40,13 @@ class EmulatedArm:
         held: Whether torque is on at the start, as left by an earlier program; otherwise the arm falls at once.
         servo_rules_only: Whether the checker reports only packets that the servos themselves reject.
         paced: Whether time stands still until the emulator's `run_to`.
+        advance: Advances a given world by a step.
     """
 
     def __init__(
         self,
         robot: RobotDescription,
-        scene: Path = Path("scene.xml"),
+        scene: Path | tuple[mujoco.MjModel, mujoco.MjData] = Path("scene.xml"),
         link: Path | None = None,
         control: Path | None = None,
         posture_deg: Mapping[str, float] | None = None,
@@ -54,6 +55,7 @@ class EmulatedArm:
         servo_rules_only: bool = False,
         *,
         paced: bool = False,
+        advance: Callable[[], None] | None = None,
     ) -> None:
         self._paced = paced
         pose = dict(zip(robot.joint_names, robot.base_pose.tolist(), strict=True))
@@ -69,7 +71,8 @@ class EmulatedArm:
         self.robot = robot
         self._servos = emulated_servos(robot)
         with _as_input_errors():
-            self.mechanics = MujocoMechanics(robot.model_path.parent / scene, joints, pose)
+            world = robot.model_path.parent / scene if isinstance(scene, Path) else scene
+            self.mechanics = MujocoMechanics(world, joints, pose, advance)
         self._joints = dict(zip(robot.servo_ids, joints, strict=True))
         self._objects = _free_bodies(self.mechanics.model)
         self._link, self._control, self._seed, self._held = link, control, seed, held

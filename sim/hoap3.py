@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import logging
-from typing import BinaryIO
+from collections.abc import Callable, Iterator
+from typing import Any, BinaryIO
 
 import numpy as np
 
+from paramove.bus import Received, Topic, topics
 from paramove.documents import Floats
-from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
+from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.robots import RobotDescription
 from paramove.robots.hoap3 import Firmware, receive, state_message
 from paramove.robots.streaming import StreamReader
+from sim.world import World
 
 _log = logging.getLogger(__name__)
 
@@ -32,9 +35,27 @@ class Hoap3:
         self._log = log
         self._played: list[np.ndarray] = []
 
-    def handle(self, batch: StreamBatch) -> None:
+    def handle(self, received: Received) -> None:
         """What came over the wire."""
-        receive(batch, self.stream)
+        if received.topic is topics.WIRE_HOAP3_STREAM:
+            receive(received.message, self.stream)
+
+    def run_to(self, world: World, steps: int, step: Callable[[], None]) -> None:
+        """Lets a world run up to so many steps, each by `step`."""
+        while world.steps < steps:
+            world.apply(self.torques(world.joint_positions(), world.joint_velocities()))
+            step()
+        self.write_log()
+
+    def messages(self, world: World, now_ns: int) -> Iterator[tuple[Topic, Any]]:
+        """What the robot reports."""
+        yield topics.WIRE_HOAP3_STATE, self.state(world.joint_positions(), now_ns)
+
+    def connect(self, world: World, step: Callable[[], None]) -> None:
+        """It moves by torques."""
+
+    def close(self) -> None:
+        """Nothing is open."""
 
     def torques(self, positions: Floats, velocities: Floats) -> Floats:
         """Of the motors, [J], N m, in the next millisecond; joints in rad and rad/s."""

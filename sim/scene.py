@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.documents import Floats
+from paramove.robots import RobotDescription
 from paramove.workspace import Workspace
 from sim import looks, opening, places, tool_box
 from sim.looks import Looks
+from sim.mount import Mount
 
-ROBOT_MODEL = Workspace.here().find("robot_description/hoap3/hoap3.xml")
+HOAP3 = Workspace.here().find("robot_description/hoap3")
 
 SOLREF = (0.002, 1.0)  # stiff: nothing sinks in by more than 0.7 mm
 SOLIMP = (0.99, 0.999, 0.0003, 0.5, 2.0)
@@ -36,6 +38,8 @@ RGBA = {
     "box": (0.56, 0.55, 0.53, 1.0),
     "lining": (0.13, 0.13, 0.13, 1.0),
 }
+HAND = "person_hand"
+"""Body of the person's hand; robots have hands, too."""
 HIDDEN_GROUP = 3
 MARGIN_SHARE = 16 / 240  # rendered beyond each border, which the lens may pull in
 RENDERED_PX = (
@@ -53,26 +57,22 @@ Furnish = Callable[[mujoco.MjSpec, Floats], None]
 """Adds more to a world, which it is given with the place of the right shoulder in it, [3], m."""
 
 
-def build(world_looks: Looks, furnish: Furnish | None = None) -> mujoco.MjModel:
-    """The compiled model of a seed's world."""
-    spec = mujoco.MjSpec.from_file(str(ROBOT_MODEL))
+def build(world_looks: Looks, robot: RobotDescription, furnish: Furnish | None = None) -> tuple[mujoco.MjModel, Mount]:
+    """The compiled model of a seed's world, and how the robot stands in it."""
+    spec = mujoco.MjSpec.from_file(str(robot.model_path))
+    mount = Mount.of(robot, spec)
     _set_options(spec)
-    world_from_shoulder = shoulder_in_world(spec)
+    world_from_shoulder = mount.origin
+    mount.add_stand(spec, RGBA["table"])
     _add_lights(spec, world_looks.brightness)
     _add_surroundings(spec, world_from_shoulder)
     _add_box(spec, world_from_shoulder, world_looks.measures)
-    _add_cylinders(spec, world_from_shoulder)
+    _add_cylinders(spec, world_from_shoulder, mount.object_radius)
     _add_hand(spec, world_from_shoulder)
     _add_cameras(spec, world_looks, world_from_shoulder)
     if furnish is not None:
         furnish(spec, world_from_shoulder)
-    return spec.compile()
-
-
-def shoulder_in_world(spec: mujoco.MjSpec) -> Floats:
-    """Origin of the right shoulder's frame in the world, [3], m. The axes are parallel."""
-    site = spec.site("right_shoulder")
-    return np.array(site.pos, dtype=np.float64)
+    return spec.compile(), mount
 
 
 def _set_options(spec: mujoco.MjSpec) -> None:
@@ -234,15 +234,15 @@ def _add_surface(
     )
 
 
-def _add_cylinders(spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
+def _add_cylinders(spec: mujoco.MjSpec, world_from_shoulder: Floats, radius: float) -> None:
     for colour, place in zip(tool_box.COLOURS, places.PARKED, strict=True):
         body = spec.worldbody.add_body(name=colour, pos=world_from_shoulder + place)
         body.add_freejoint(name=colour)
         body.add_geom(
             name=colour,
             type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            size=(tool_box.CYLINDER_RADIUS, tool_box.CYLINDER_HALF_HEIGHT, 0.0),
-            mass=tool_box.CYLINDER_MASS,
+            size=(radius, tool_box.CYLINDER_HALF_HEIGHT, 0.0),
+            mass=tool_box.CYLINDER_MASS * (radius / tool_box.CYLINDER_RADIUS) ** 2,
             rgba=RGBA[colour],
             friction=OBJECT_FRICTION,
             solref=SOLREF,
@@ -253,7 +253,7 @@ def _add_cylinders(spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
 
 def _add_hand(spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
     """The instructor's hand, which touches nothing. Origin: tip of the pointing finger; z from there to the wrist."""
-    body = spec.worldbody.add_body(name="hand", mocap=True, pos=world_from_shoulder + places.IDLE_FINGERTIP)
+    body = spec.worldbody.add_body(name=HAND, mocap=True, pos=world_from_shoulder + places.IDLE_FINGERTIP)
     capsule, ellipsoid = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ELLIPSOID
     looks_only = {"contype": 0, "conaffinity": 0, "mass": 0.0}
     parts = (
@@ -280,7 +280,7 @@ def _add_hand(spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
             name=f"hold_{colour}",
             type=mujoco.mjtEq.mjEQ_WELD,
             objtype=mujoco.mjtObj.mjOBJ_BODY,
-            name1="hand",
+            name1=HAND,
             name2=colour,
             active=False,
             solref=HOLD_SOLREF,

@@ -15,8 +15,9 @@ from sim.looks import Looks
 from sim.person import Person
 from sim.place_instructor import OBJECT, START, PlaceInstructor
 from sim.pointing_world import PointingWorld
+from sim.servo_arm import ServoArm
 from sim.servo_arm_world import ServoArmWorld
-from sim.simulation import Simulated, Simulation
+from sim.simulation import Simulated, SimulatedRobot, Simulation
 from sim.tracked_person import TrackedPerson, world_from_table
 from sim.world import World
 
@@ -38,15 +39,22 @@ def build(options: Config, run_folder: Path, bus_folder: Path, firmware_log: Bin
         return ServoArmWorld(robot, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed)
     if options.scene == "pointing":
         return PointingWorld(options.seed, options.targets, options.views, options.markers)
-    return at_the_tool_box(options, firmware_log)
+    return at_the_tool_box(options, run_folder, bus_folder, firmware_log)
 
 
-def at_the_tool_box(options: Config, firmware_log: BinaryIO | None = None) -> Simulation:
-    """A scene of HOAP-3 at its tool box."""
+def at_the_tool_box(
+    options: Config, run_folder: Path = Path(), bus_folder: Path = Path(), firmware_log: BinaryIO | None = None
+) -> Simulation:
+    """A scene of a robot at the tool box."""
     draws, world_looks = looks.streams(options.seed), Looks.draw(options.seed, options.measures)
-    robot = Hoap3(RobotDescription.load(options.robot), firmware_log)
+    description = RobotDescription.load(options.robot)
+    robot: SimulatedRobot
+    if description.chain is None:
+        robot = Hoap3(description, firmware_log)
+    else:
+        robot = ServoArm(description, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed)
     tracked = None if options.scene == "rule_learning" else TrackedPerson(options.seed)
-    world = World(world_looks, robot.description, None if tracked is None else tracked.furnish)
+    world = World(world_looks, description, None if tracked is None else tracked.furnish)
     cameras: list[ImageSource] = [ViewForPeople(world.model)] if options.video else []
     if options.camera and options.scene != "relocate_by_pointing":
         cameras.append(RobotCamera(world.model, world_looks, draws["noise"]))

@@ -16,7 +16,6 @@ from paramove.msgs.truth_pb2 import TruthLayout
 from sim import truth
 from sim.arm import ELBOW, SHOULDER, TIP, WRIST
 from sim.camera import ImageSource
-from sim.hoap3 import Hoap3
 from sim.human import place_arm
 from sim.looks import Looks
 from sim.person import Person
@@ -67,6 +66,28 @@ class Simulated(Protocol):
         """Gives the graphics contexts back."""
 
 
+class SimulatedRobot(Protocol):
+    """What moves a robot's motors in a world."""
+
+    def connect(self, world: World, step: Callable[[], None]) -> None:
+        """Begins to move in a world that advances by `step`."""
+
+    def handle(self, received: Received) -> None:
+        """Handles a message of the bus."""
+
+    def run_to(self, world: World, steps: int, step: Callable[[], None]) -> None:
+        """Lets the world run up to so many steps."""
+
+    def messages(self, world: World, now_ns: int) -> Iterator[tuple[Topic, Any]]:
+        """What it reports on the bus."""
+
+    def commanded_gripper(self) -> Floats | None:
+        """Gripper as commanded, [3], frame of the tool box's measures, m; None if nobody knows."""
+
+    def close(self) -> None:
+        """Disconnects."""
+
+
 class Simulation:
     """A world of physics with a robot, a person and cameras in it.
 
@@ -89,7 +110,7 @@ class Simulation:
         self,
         looks: Looks,
         world: World,
-        robot: Hoap3,
+        robot: SimulatedRobot,
         person: Person,
         cameras: Sequence[ImageSource] = (),
         world_from_table: Floats | None = None,
@@ -100,6 +121,7 @@ class Simulation:
         self.world_from_table = world_from_table
         self.write_measures = write_measures
         self.physics_s = self.rendering_s = 0.0
+        robot.connect(world, self._step)
 
     @property
     def now_ns(self) -> int:
@@ -117,21 +139,19 @@ class Simulation:
 
     def handle(self, received: Received) -> None:
         """Handle a message of the stream or of the robot's speech."""
-        if received.topic is topics.WIRE_HOAP3_STREAM:
-            self.robot.handle(received.message)
-        elif received.topic is topics.SPEECH:
+        self.robot.handle(received)
+        if received.topic is topics.SPEECH:
             self.person.handle(received.message.request, received.message.object)
 
     def run_to_tick(self, tick: int) -> None:
         """Let the world run up to a tick; raises SimulationError."""
         started = time.perf_counter()
-        world = self.world
-        while world.steps < step_of_tick(tick):
-            torques = self.robot.torques(world.joint_positions(), world.joint_velocities())
-            self.person.advance(0.001)
-            world.step(torques)
-        self.robot.write_log()
+        self.robot.run_to(self.world, step_of_tick(tick), self._step)
         self.physics_s += time.perf_counter() - started
+
+    def _step(self) -> None:
+        self.person.advance(0.001)
+        self.world.step()
 
     def messages(self) -> Iterator[tuple[Topic, Any]]:
         """Everything that the world shows now. A state that is not finite never gets here: the step raises."""
@@ -141,7 +161,7 @@ class Simulation:
         images = [image for camera in self._cameras for image in camera.images(self.world.data, self.tick, self.now_ns)]
         self.rendering_s += time.perf_counter() - started
         yield from images
-        yield topics.WIRE_HOAP3_STATE, self.robot.state(self.world.joint_positions(), self.now_ns)
+        yield from self.robot.messages(self.world, self.now_ns)
         yield topics.TRUTH_STATE, truth.state(self.now_ns, self.world, self.robot, self.person)
         if self.person.arm is not None:
             yield topics.TRUTH_ARM, truth.arm(self.now_ns, self.person.arm)
@@ -162,6 +182,7 @@ class Simulation:
 
     def close(self) -> None:
         """Gives the graphics contexts back, and logs contacts that should not have been."""
+        self.robot.close()
         for camera in self._cameras:
             camera.close()
         pairs = self.world.contacts.unwanted_pairs

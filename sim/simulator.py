@@ -60,7 +60,7 @@ OF_SCENES: Mapping[frozenset[str], frozenset[str]] = {
     frozenset({"targets", "views", "markers"}): frozenset({"pointing"}),
     frozenset({"robot"}): frozenset(get_args(Scene)) - {"pointing"},
     frozenset({"camera", "video", "measures"}): frozenset(get_args(Scene)) - {"pointing", "servo_arm"},
-    frozenset({"port"}): frozenset({"servo_arm"}),
+    frozenset({"port"}): frozenset(get_args(Scene)) - {"pointing"},
     frozenset({"arm_image_every"}): frozenset({"rule_learning_whole_arm", "relocate_by_pointing"}),
 }
 """Parameters that not every scene has."""
@@ -85,7 +85,7 @@ class Config(NodeConfig):
         targets: Of `pointing`: how often the person points.
         views: Of `pointing`: which cameras look, from 1.
         markers: Of `pointing`: points of the arm at which the person wears coloured balls.
-        port: Of `servo_arm`: link to the serial port, relative to the run's folder.
+        port: Of a servo arm: link to the serial port, relative to the run's folder.
         max_duration_s: Simulated time after which the run ends.
         pace: Simulated seconds per second when nobody waits for anybody (not in lockstep).
         firmware_log: Whether every frame that the firmware plays is written to the run folder (56 kB/s), for those who

@@ -44,7 +44,7 @@ class TrackedPerson:
 
     def furnish(self, spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
         """The arm and its cameras; the hand alone, which holds objects, is no longer rendered."""
-        for geom in spec.body("hand").geoms:
+        for geom in spec.body(scene.HAND).geoms:
             geom.group = scene.HIDDEN_GROUP
         look = draw_look(self._stream(LOOK))
         add_cloth(spec, look)

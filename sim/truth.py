@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from paramove.documents import Floats
 from paramove.msgs.truth_pb2 import TruthArm, TruthBody, TruthLayout, TruthState
 from sim import tool_box
 from sim.arm import ELBOW, SHOULDER, TIP, Arm
-from sim.hoap3 import Hoap3
 from sim.looks import Looks
 from sim.person import Person
+from sim.scene import HAND
 from sim.small_person import table_from_shoulder
 from sim.world import World
+
+if TYPE_CHECKING:
+    from sim.simulation import SimulatedRobot
 
 
 def layout(looks: Looks, world: World, world_from_table: Floats | None) -> TruthLayout:
@@ -23,7 +28,7 @@ def layout(looks: Looks, world: World, world_from_table: Floats | None) -> Truth
     camera_from_world[:3, 3] = -camera.shoulder_from_optical.T @ (camera.position + origin)
     message = TruthLayout(
         seed=looks.seed,
-        world_from_shoulder=origin.tolist(),
+        world_from_shoulder=world.mount.base.tolist(),
         camera_from_world=camera_from_world.ravel().tolist(),
         camera_intrinsics=[camera.focal_px, camera.focal_px, *camera.principal_point_px, camera.k1],
         surface_z=tool_box.SURFACE_Z + origin[2],
@@ -40,14 +45,15 @@ def layout(looks: Looks, world: World, world_from_table: Floats | None) -> Truth
     return message
 
 
-def state(now_ns: int, world: World, robot: Hoap3, person: Person) -> TruthState:
-    """What is so now."""
+def state(now_ns: int, world: World, robot: SimulatedRobot, person: Person) -> TruthState:
+    """What is so now; where the commanded gripper is not known, it is the true one."""
     contacts, origin = world.contacts, world.world_from_shoulder
     gripper, _ = world.gripper()
+    commanded = robot.commanded_gripper()
     message = TruthState(
         time_ns=now_ns,
         gripper=(gripper + origin).tolist(),
-        gripper_commanded=(robot.commanded_gripper() + origin).tolist(),
+        gripper_commanded=((gripper if commanded is None else commanded) + origin).tolist(),
         joint_positions=world.joint_positions().tolist(),
         unwanted_contacts=contacts.unwanted,
         deepest_penetration_mm=1e3 * contacts.deepest,
@@ -59,7 +65,8 @@ def state(now_ns: int, world: World, robot: Hoap3, person: Person) -> TruthState
         body.held_by_instructor = world.held_by_instructor == colour
         body.last_touched_by = world.last_touched_by[colour]
         message.objects.append(body)
-    message.hand.CopyFrom(_body(world, "hand"))
+    message.hand.CopyFrom(_body(world, HAND))
+    message.hand.name = "hand"
     return message
 
 

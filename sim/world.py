@@ -29,7 +29,8 @@ class SimulationError(RuntimeError):
 class World:
     """Physics of one seed's world.
 
-    Positions that come in and go out are in the frame of the robot's right shoulder unless the name says world.
+    Positions that come in and go out are in the frame of the tool box's measures, that of HOAP-3's right shoulder,
+    unless the name says world.
 
     Args:
         looks: How it looks; lights and cameras are part of the model.
@@ -38,20 +39,20 @@ class World:
     """
 
     def __init__(self, looks: Looks, description: RobotDescription, furnish: scene.Furnish | None = None) -> None:
-        self.model = scene.build(looks, furnish)
+        self.model, self.mount = scene.build(looks, description, furnish)
         self.data = mujoco.MjData(self.model)
         self.description = description
         model = self.model
-        self.world_from_shoulder: Floats = np.array(model.site("right_shoulder").pos, dtype=np.float64)
+        self.world_from_shoulder = self.mount.origin
         joints = [model.joint(name) for name in description.joint_names]
         self._qpos_index = np.array([joint.qposadr[0] for joint in joints])
         self._dof_index = np.array([joint.dofadr[0] for joint in joints])
         self._actuators = np.array([model.actuator(name).id for name in description.joint_names])
-        self._body = {name: model.body(name).id for name in (*tool_box.COLOURS, "box", "hand")}
-        self._mocap = {name: int(model.body_mocapid[self._body[name]]) for name in ("box", "hand")}
+        self._body = {name: model.body(name).id for name in (*tool_box.COLOURS, "box", scene.HAND)}
+        self._mocap = {name: int(model.body_mocapid[self._body[name]]) for name in ("box", scene.HAND)}
         self._weld = {name: model.equality(f"hold_{name}").id for name in tool_box.COLOURS}
-        self._gripper = model.site("right_gripper").id
-        self._watch = ContactWatch(model)
+        self._gripper = model.site(self.mount.gripper).id
+        self._watch = ContactWatch(model, self.mount.root, self.mount.sides)
         self._warnings = self.data.warning
         self.held_by_instructor: str | None = None
         self.last_touched_by: dict[str, str] = dict.fromkeys(tool_box.COLOURS, "")
@@ -84,13 +85,16 @@ class World:
         """[J], rad/s."""
         return np.asarray(self.data.qvel[self._dof_index])
 
-    def step(self, torques: Floats) -> None:
-        """One millisecond with the given torques of the motors, [J], N m.
+    def apply(self, torques: Floats) -> None:
+        """Torques of the motors in the next steps, [J], N m."""
+        self.data.ctrl[self._actuators] = torques
+
+    def step(self) -> None:
+        """One millisecond.
 
         Raises:
             SimulationError: MuJoCo warns of a state that is not finite or of too many contacts.
         """
-        self.data.ctrl[self._actuators] = torques
         mujoco.mj_step(self.model, self.data)
         self.steps += 1
         if self._warnings.number.any():
@@ -145,8 +149,8 @@ class World:
 
     def move_hand(self, fingertip: Floats, backward: Floats) -> None:
         """Bring the instructor's hand: its fingertip [3], and the direction [3] from there to the wrist."""
-        self.data.mocap_pos[self._mocap["hand"]] = fingertip + self.world_from_shoulder
-        self.data.mocap_quat[self._mocap["hand"]] = hand_quaternion(backward)
+        self.data.mocap_pos[self._mocap[scene.HAND]] = fingertip + self.world_from_shoulder
+        self.data.mocap_quat[self._mocap[scene.HAND]] = hand_quaternion(backward)
 
     def move_box(self, offset: Floats, quaternion: tuple[float, ...] | Floats) -> None:
         """Bring the box to `offset` [3] from its place, turned by the quaternion (w, x, y, z)."""
@@ -159,7 +163,7 @@ class World:
 
     def grasp(self, name: str) -> None:
         """The instructor's hand holds the cylinder as it lies now, until `release`."""
-        hand = self._mocap["hand"]
+        hand = self._mocap[scene.HAND]
         back = _conjugate(self.data.mocap_quat[hand])
         away = self.data.xpos[self._body[name]] - self.data.mocap_pos[hand]
         self._grasped = (_rotate(back, away), _multiply(back, self.data.xquat[self._body[name]]))
@@ -171,7 +175,7 @@ class World:
         """Turn the held cylinder upright under the fingertip, by `fraction` 0 to 1 of the rotation."""
         if self.held_by_instructor is None or self._grasped is None:
             return
-        back = _conjugate(self.data.mocap_quat[self._mocap["hand"]])
+        back = _conjugate(self.data.mocap_quat[self._mocap[scene.HAND]])
         offset, turn = self._grasped
         upright = _upright_near(_multiply(_conjugate(back), turn))
         goal = _multiply(back, upright)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import mujoco
@@ -22,27 +22,27 @@ class MujocoMechanics:
     """A simulated world whose joints the servos drive; gravity, contacts and damping are as in the model.
 
     Args:
-        model_path: MJCF. Its time step is set to 1 ms; its actuators are disabled, the servos replace them.
+        world: MJCF file, or a model with its state. Its time step is set to 1 ms; its actuators are disabled, the
+            servos replace them.
         joints: Driven joints in the order of the chain. Two servos may drive one joint.
-        posture: Initial joint positions by name, rad; others as in the model.
+        posture: Initial joint positions by name, rad; others as they are in the world.
+        advance: Advances the world by a step, with whatever else moves in it; by default `mujoco.mj_step`.
 
     Attributes:
         model, data: MuJoCo model and state, to inspect or change the world.
     """
 
     def __init__(
-        self, model_path: Path, joints: Sequence[DrivenJoint], posture: Mapping[str, float] | None = None
+        self,
+        world: Path | tuple[mujoco.MjModel, mujoco.MjData],
+        joints: Sequence[DrivenJoint],
+        posture: Mapping[str, float] | None = None,
+        advance: Callable[[], None] | None = None,
     ) -> None:
-        try:
-            self.model = mujoco.MjModel.from_xml_path(str(model_path))
-        except ValueError as error:
-            missing = not Path(model_path).is_file()
-            raise EmulatorError(
-                f"{model_path} is not a model that MuJoCo can load: {error}", missing=missing
-            ) from error
+        self.model, self.data = world if isinstance(world, tuple) else _loaded(world)
+        self._advance = advance or (lambda: mujoco.mj_step(self.model, self.data))
         self.model.opt.timestep = STEP_S
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
-        self.data = mujoco.MjData(self.model)
         numbers = [self._joint(joint.name) for joint in joints]
         self._qpos = np.array([self.model.jnt_qposadr[one] for one in numbers], dtype=np.intp)
         self._dof = np.array([self.model.jnt_dofadr[one] for one in numbers], dtype=np.intp)
@@ -71,7 +71,7 @@ class MujocoMechanics:
         for dof, gear, effort, is_blocked in zip(self._dof, self._gear, efforts, blocked, strict=True):
             self.data.qfrc_applied[dof] += gear * effort.torque
             self.model.dof_damping[dof] += gear * gear * effort.damping + (BLOCKED_DAMPING if is_blocked else 0.0)
-        mujoco.mj_step(self.model, self.data)
+        self._advance()
         if self.data.warning.number.any():
             kinds = [mujoco.mjtWarning(number).name for number in np.flatnonzero(self.data.warning.number)]
             raise RuntimeError(f"the emulated servos' world broke at {self.data.time:.3f} s: {', '.join(kinds)}")
@@ -96,3 +96,12 @@ class MujocoMechanics:
         if name not in known:
             raise EmulatorError(f"the world has no hinge or slide {name!r} for a servo; {suggestion(name, known)}")
         return number
+
+
+def _loaded(path: Path) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        missing = not Path(path).is_file()
+        raise EmulatorError(f"{path} is not a model that MuJoCo can load: {error}", missing=missing) from error
+    return model, mujoco.MjData(model)

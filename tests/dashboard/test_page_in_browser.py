@@ -31,7 +31,6 @@ pytestmark = [
 TEXTS = Texts(
     stages=("calibrate", "learn", "apply", "done"),
     belongs="belongs in the opening at",
-    origin="the right shoulder",
 )
 STOPPED = "stopped from the page by a person"
 

@@ -7,7 +7,7 @@ from benchmarks.many_worlds import RESTS, View, tolerance
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.robots.description import RobotDescription
 from sim import tool_box
-from sim.scene import ROBOT_MODEL
+from sim.scene import HOAP3
 from sim.tool_box import Measures
 from sim.world import OPENINGS_UP
 from tests.objects.scene import Look, Scene
@@ -51,7 +51,7 @@ def test_the_object_that_the_finger_is_near_is_pointed_at(seed: int) -> None:
 
 @pytest.fixture(scope="module")
 def hoap3() -> RobotDescription:
-    return RobotDescription.load(ROBOT_MODEL.parent)
+    return RobotDescription.load(HOAP3)
 
 
 @pytest.mark.parametrize(

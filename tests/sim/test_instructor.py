@@ -248,14 +248,16 @@ def test_moves_take_one_to_three_seconds_and_start_and_end_at_rest() -> None:
 def test_with_physics_a_cylinder_is_carried_into_its_opening(world: World) -> None:
     world.move_box(np.zeros(3), OPENINGS_UP)
     world.place("green", tool_box.standing_centre(0.185, -0.02))
-    world.step(np.zeros(28))
+    world.apply(np.zeros(28))
+    world.step()
     instructor = Instructor(world, world_rules := Looks.draw(0).rules, looks.streams(0))
     description = world.description
     firmware, counts = Firmware(description), description.units.to_counts(description.base_pose)
     instructor.handle(Speech.REQUEST_SHOW_RULE_AGAIN, "green")
     while instructor.busy and world.time_s < 20:
         instructor.advance(0.001)
-        world.step(firmware.step(counts, world.joint_positions(), world.joint_velocities()))
+        world.apply(firmware.step(counts, world.joint_positions(), world.joint_velocities()))
+        world.step()
     item = next(item for item in tool_box.OPENINGS if item.name == world_rules["green"])
     centre = world.position("green")
     assert np.hypot(centre[0] - item.x, centre[1] - item.y) < tool_box.OPENING_RADIUS

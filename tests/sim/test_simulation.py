@@ -106,7 +106,8 @@ def test_camera_shows_each_colour_where_it_stands(seeing: Simulation) -> None:
     places = {"yellow": (0.180, -0.08), "green": (0.190, -0.01), "blue": (0.178, 0.06)}
     for colour, place in places.items():
         world.place(colour, tool_box.standing_centre(*place))
-    world.step(np.zeros(world.description.n_joints))
+    world.apply(np.zeros(world.description.n_joints))
+    world.step()
     image_raw = seeing.shown()[topics.CAMERA_IMAGE_RAW]
     assert (image_raw.width, image_raw.height, image_raw.encoding) == (looks.WIDTH_PX, looks.HEIGHT_PX, "rgb8")
     image = np.frombuffer(image_raw.data, np.uint8).reshape(image_raw.height, image_raw.width, 3)

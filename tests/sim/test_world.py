@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from paramove.robots.description import RobotDescription
 from paramove.robots.hoap3.firmware import Firmware
-from sim import places, tool_box
+from sim import places, scene, tool_box
 from sim.world import OPENINGS_UP, SimulationError, World, hand_quaternion
 
 
@@ -18,7 +18,8 @@ def _run(world: World, seconds: float, counts: np.ndarray | None = None) -> None
     if counts is None:
         counts = world.description.units.to_counts(world.description.base_pose)
     for _ in range(round(1000 * seconds)):
-        world.step(firmware.step(counts, world.joint_positions(), world.joint_velocities()))
+        world.apply(firmware.step(counts, world.joint_positions(), world.joint_velocities()))
+        world.step()
 
 
 def test_friction_between_table_and_object_really_is_a_quarter(world: World) -> None:
@@ -60,8 +61,8 @@ def test_no_constraint_ties_the_robot_to_anything(world: World) -> None:
     for equality in range(model.neq):
         assert model.eq_type[equality] == mujoco.mjtEq.mjEQ_WELD
         ends = {model.body(int(model.eq_obj1id[equality])).name, model.body(int(model.eq_obj2id[equality])).name}
-        assert "hand" in ends
-        assert ends - {"hand"} < set(tool_box.COLOURS)
+        assert scene.HAND in ends
+        assert ends - {scene.HAND} < set(tool_box.COLOURS)
         assert model.body_rootid[model.eq_obj1id[equality]] != torso
         assert model.body_rootid[model.eq_obj2id[equality]] != torso
         assert not model.eq_active0[equality]
@@ -153,8 +154,9 @@ def test_a_state_that_is_not_finite_stops_the_simulation_and_names_the_joint(
         world.data.qvel[joint.dofadr[0]] = np.nan
     else:
         world.data.qpos[joint.qposadr[0]] = np.nan
+    world.apply(torques)
     with pytest.raises(SimulationError, match=part):
-        world.step(torques)
+        world.step()
 
 
 def test_parked_cylinders_stand_still(world: World) -> None:

@@ -91,14 +91,12 @@ class Texts(BaseModel):
     Attributes:
         stages: Names of the application's stages, in their order.
         belongs: Head of the column with the positions that the rules give.
-        origin: Where positions are measured from.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     stages: tuple[str, ...] = ()
     belongs: str = "belongs at"
-    origin: str = "the robot's base"
 
 
 class LivePicture:
@@ -135,7 +133,8 @@ class LivePicture:
         self._arm: dict[str, Any] = {}
         self._image: bytes | None = None
         texts = texts or Texts()
-        self._page = {"title": title, "robot": robot is not None, **texts.model_dump()}
+        origin = "the right shoulder" if robot is None or robot.chain is None else "the arm's base"
+        self._page = {"title": title, "robot": robot is not None, "origin": origin, **texts.model_dump()}
         estimates = self._estimates
         self._handlers: dict[str, Callable[[Any, float], None]] = {
             topics.APPLICATION_STAGE.name: estimates.on_stage,

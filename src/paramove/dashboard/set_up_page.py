@@ -31,7 +31,7 @@ class SetUpPage:
 
     def __init__(self, server: PageServer, title: str) -> None:
         self._server = server
-        server.show({"page": {"title": title, "robot": False, **Texts().model_dump()}})
+        server.show({"page": {"title": title, "robot": False, "origin": "", **Texts().model_dump()}})
 
     def passing(
         self, images: Iterator[tuple[CalibratedCamera, int, Image]], camera_name: str

@@ -95,7 +95,8 @@ class Chain:
         gripper: Name of the joint that closes the gripper; `gripper_index` its index.
         gripper_open, gripper_closed: Its angles, rad.
         felt_opening, holding_openings: How a held object is detected: see `FingersPart`.
-        grip_current_ma: With which it holds an object; None: its servo has no such mode.
+        object_width: Of the smallest and the largest object that the gripper can hold and feel, m.
+        grip_current_ma: With which it holds one; None: its servo has no such mode.
         kinematics: Within the robot's soft limits; in the frame of the base site.
     """
 
@@ -107,6 +108,7 @@ class Chain:
     gripper_closed: float
     felt_opening: float
     holding_openings: tuple[float, float]
+    object_width: tuple[float, float]
     grip_current_ma: float | None
     sites: ChainSites
     kinematics: PlanarArm
@@ -317,6 +319,7 @@ def _chain(names: tuple[str, ...], chain: ChainPart, lower: Floats, upper: Float
         gripper_closed=float(np.deg2rad(chain.gripper.closed_deg)),
         felt_opening=chain.gripper.felt_opening,
         holding_openings=chain.gripper.holding_openings,
+        object_width=chain.gripper.object_width_m,
         grip_current_ma=chain.gripper.grip_current_ma,
         sites=chain.sites,
         kinematics=PlanarArm(

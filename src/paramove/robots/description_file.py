@@ -97,8 +97,11 @@ class FingersPart(_Part):
 
 
 class GripperPart(FingersPart):
-    """`grip_current_ma`: with which it holds an object; None for a servo without such a mode."""
+    """`object_width_m`: smallest and largest object that it can hold and feel, between the opened fingers as it comes
+    down. `grip_current_ma`: with which it holds one; None for a servo without such a mode.
+    """
 
+    object_width_m: tuple[float, float] = (0.015, 0.025)
     grip_current_ma: float | None = Field(default=None, gt=0)
 
 

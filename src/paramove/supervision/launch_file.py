@@ -32,6 +32,8 @@ from paramove.workspace import Workspace
 _QUOTED = re.compile(r"'([^']*)'")
 _PLAIN_NAME = re.compile(r"[a-z][a-z0-9_]*")
 _FOLDER = Path("launch")
+SERVO_ARM = "servo_arm"
+"""Overlay of a launch file for arms of servos."""
 
 
 class LaunchFileMissingError(DocumentError):
@@ -73,12 +75,13 @@ def load(
         settings: Each `node.parameter=value`; the value is YAML.
         seed: Written into each of the file's `seed_parameters`.
         headless: Sets the parameters that the file names under `headless`, before `settings`.
-        robot: Written into the parameter `robot` of each node for which the files give one, before `settings`.
+        robot: Written into the parameter `robot` of each node for which the files give one, before `settings`. For one
+            with a chain of servos the overlay `servo_arm` is laid on top, if the launch file has one.
 
     Raises LaunchFileMissingError, or DocumentError with all that is wrong.
     """
     path = _typed(workspace, (_FOLDER,), name, "launch file")
-    document, chosen = _with_overlays(workspace, path.stem, _read(path), overlays)
+    document, chosen = _with_overlays(workspace, path.stem, _read(path), overlays, robot)
     given = [topics.present_names(setting) for setting in settings]
     document, findings = with_values(document, given, seed, headless, overlays is not None, robot)
     try:
@@ -91,7 +94,7 @@ def load(
 
 
 def _with_overlays(
-    workspace: Workspace, name: str, document: Document, overlays: Sequence[str] | None
+    workspace: Workspace, name: str, document: Document, overlays: Sequence[str] | None, robot: str | None
 ) -> tuple[Document, list[str]]:
     """The document with its overlays, and their names; raises DocumentError with what is wrong in any of them."""
     paths, findings = [], []
@@ -113,6 +116,9 @@ def _with_overlays(
     else:
         chosen = list(overlays)
         paths = [_typed(workspace, folders, overlay, "overlay") for overlay in chosen]
+    if robot is not None and SERVO_ARM in workspace.names(folders[0]) and _has_chain(workspace, robot):
+        chosen = [*chosen, SERVO_ARM]
+        paths.append(_named(workspace, folders, SERVO_ARM))
     for path in paths:
         try:
             top = _read(path)
@@ -148,6 +154,17 @@ def _causes(details: Sequence[ErrorDetails]) -> list[ErrorDetails]:
 def overlay_folders(launch: str) -> tuple[Path, Path]:
     """Folders of a workspace with the overlays of a launch file: those for it alone, and those for all."""
     return _FOLDER / "overlays" / launch, _FOLDER / "overlays"
+
+
+def _has_chain(workspace: Workspace, robot: str) -> bool:
+    """Whether a robot, named by its folder, is an arm of servos. One that cannot be read is rejected by its nodes."""
+    folder = Path(robot)
+    if not folder.exists() and not folder.is_absolute():
+        folder = workspace.find(folder if len(folder.parts) > 1 else Path("robot_description", folder))
+    try:
+        return "chain" in read_mapping(read_text(folder / "robot.yaml", "robot description"), robot).data
+    except (InputError, DocumentError):
+        return False
 
 
 def _named(workspace: Workspace, folders: Sequence[Path], name: str) -> Path:
