@@ -51,6 +51,14 @@ def test_movements_of_a_recording_become_a_set(recording, tmp_path):
     assert "--append" in again.stderr
 
 
+def test_another_board_than_that_of_the_calibration_is_an_error(recording, tmp_path):
+    write_cameras(tmp_path / "cameras.yaml", cameras(2), 0.045)
+    answer = teach(recording, tmp_path / "set", "--cameras", str(tmp_path / "cameras.yaml"))
+    assert answer.exit_code == 78
+    assert "45 mm" in answer.stderr
+    assert "30 mm" in answer.stderr
+
+
 @pytest.mark.parametrize(
     ("more", "code", "message"),
     [

@@ -82,6 +82,8 @@ def test_too_few_images_and_impossible_lengths_are_errors(poses):
         measured_arm(CAMERA, [*seen(poses)[:15], BodyKeyPoints.nobody()], distance=DISTANCE)
     with pytest.raises(InputError, match="is the distance right"):
         measured_arm(CAMERA, seen(poses), distance=4.0 * DISTANCE)
+    with pytest.raises(InputError, match="is the distance right"):
+        measured_arm(CAMERA, seen(poses), distance=1.6 * DISTANCE)
     for wrong in ({"distance": 0.0}, {"height": 0.0}, {"height": 175.0}):
         with pytest.raises(InputError, match=next(iter(wrong))):
             PersonSetUp(CAMERA, **wrong)

@@ -1,14 +1,16 @@
 """A simulated person teaches by touching positions; the set, and the prompts to the person."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from paramove.cameras import Board
-from paramove.demonstrations import DemonstrationSet, TaughtSet
+from paramove.demonstrations import RESTING_SHOULDER, DemonstrationSet, TaughtSet
 from paramove.documents import InputError
 from paramove.observation import BodyKeyPoints, WebcamTeacher, board_targets
 from studies.teaching.experiment import cameras
-from studies.teaching.simulated_person import RATE_HZ, key_points, movement
+from studies.teaching.simulated_person import RATE_HZ, SIZES, key_points, movement
 
 TARGETS = board_targets(Board(0.03).corners())
 
@@ -66,6 +68,30 @@ def test_another_position_is_asked_for_again(tmp_path):
     assert "1 of 1" in person.teacher.prompt
     assert not (tmp_path / "set" / "labels.yaml").exists()
     assert "touched" in person.touch([0.3, 0.25, 0.0])[0]
+
+
+def test_one_camera_sees_when_another_corner_is_touched(tmp_path):
+    """Its depth is poor, but a fingertip beside the position is seen in the picture."""
+    target = np.array([0.15, -0.1, 0.0])
+    written = TaughtSet(tmp_path / "set", "reach", "ann", "a test")
+    known = {"sizes": SIZES, "shoulder": RESTING_SHOULDER}
+    teacher = WebcamTeacher(cameras(1), {"the corner": target}, written, rate_hz=RATE_HZ, **known)
+    rng, frame, said = np.random.default_rng(5), itertools.count(1), []
+    for touched in (np.array([0.31, -0.1, 0.0]), target):
+        for points in key_points(movement(touched, rng), cameras(1)[0], rng):
+            said.append(teacher.see("camera_1", round(next(frame) * 1e9 / RATE_HZ), points))
+    first, second = (one for one in said if one)
+    assert "cm beside the position" in first
+    assert "touched" in second
+
+
+def test_positions_that_the_set_has_are_not_asked_for_again(tmp_path):
+    person = Person(tmp_path / "set", dict(list(TARGETS.items())[:1]))
+    person.touch(next(iter(TARGETS.values())))
+    more = TaughtSet(tmp_path / "set", "reach", "ann", "a test", append=True)
+    assert "1 of 8" in WebcamTeacher(cameras(2), TARGETS, more).prompt
+    other = TaughtSet(tmp_path / "set", "reach", "bob", "a test", append=True)
+    assert "1 of 9" in WebcamTeacher(cameras(2), TARGETS, other).prompt
 
 
 def test_key_points_of_a_camera_that_is_not_calibrated_are_an_error(tmp_path):

@@ -2,6 +2,7 @@ from .aligned_views import AlignedViews as AlignedViews
 from .aligned_views import Views as Views
 from .calibrated import WORLD_FRAME as WORLD_FRAME
 from .calibrated import CalibratedCamera as CalibratedCamera
+from .calibrated import check_square_of as check_square_of
 from .calibrated import measured_cameras as measured_cameras
 from .calibrated import measured_file as measured_file
 from .calibrated import read_cameras as read_cameras

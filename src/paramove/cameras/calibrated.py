@@ -19,6 +19,8 @@ from ruamel.yaml import YAML
 
 from paramove.documents import Floats, Image, InputError, read_document, replacing
 
+SAME_SQUARE_M = 5e-4
+"""A print is measured this exactly."""
 MAX_CAMERAS = 4
 WORLD_FRAME = "table"
 COEFFICIENTS = (0, 4, 5, 8, 12, 14)
@@ -141,8 +143,8 @@ class CalibratedCamera:
         return result
 
 
-def write_cameras(path: Path, cameras: Sequence[CalibratedCamera]) -> None:
-    """Write a calibration file, YAML with a list `cameras`."""
+def write_cameras(path: Path, cameras: Sequence[CalibratedCamera], square: float | None = None) -> None:
+    """Write a calibration file, YAML with a list `cameras`, and the side of its board's squares, m, if it is known."""
     yaml = YAML()
     yaml.default_flow_style = None
     listed = [
@@ -157,7 +159,8 @@ def write_cameras(path: Path, cameras: Sequence[CalibratedCamera]) -> None:
         for camera in cameras
     ]
     with replacing(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
-        yaml.dump({"world_frame": WORLD_FRAME, "cameras": listed}, file)
+        board = {} if square is None else {"square_m": square}
+        yaml.dump({"world_frame": WORLD_FRAME, **board, "cameras": listed}, file)
 
 
 def read_cameras(path: Path) -> tuple[CalibratedCamera, ...]:
@@ -167,6 +170,15 @@ def read_cameras(path: Path) -> tuple[CalibratedCamera, ...]:
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{path}: a list 'cameras' expected; `paramove calibrate cameras` writes one")
     return tuple(_camera(path, number, entry) for number, entry in enumerate(listed))
+
+
+def check_square_of(path: Path, square: float) -> None:
+    """Raises InputError if a calibration file was made with squares of another side, m."""
+    made_with = read_document(path, "calibration file").data.get("square_m")
+    if isinstance(made_with, int | float) and abs(made_with - square) > SAME_SQUARE_M:
+        raise InputError(
+            f"{path} was made with squares of {1e3 * made_with:g} mm, given are {1e3 * square:g} mm: which board is it?"
+        )
 
 
 def _camera(path: Path, number: int, entry: Any) -> CalibratedCamera:

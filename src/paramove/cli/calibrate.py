@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.set_up_view import Prompts, ViewOption, prompts
+from paramove.cli.set_up_view import Prompts, ViewOption, begun, prompts
 from paramove.documents import Image, InputError, exit_codes, printable
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def cameras(
     try:
         with prompts("Calibrate cameras", view) as to_person:
             placed = _calibrated(sources, _board(square, thickness), pixels(size), to_person)
-        write_cameras(out, [placement.camera for placement in placed])
+        write_cameras(out, [placement.camera for placement in placed], length(square, "--square"))
     except InputError as error:
         raise _ended(str(error), error.exit_code) from error
     except OSError as error:
@@ -230,7 +230,7 @@ def _source(text: str, size: tuple[int, int], to_person: Prompts) -> ImageSource
     if not _is_live(text):
         return file_source(Path(text))
     name = f"camera{text}" if text.isdigit() else Path(text).name
-    return LiveImages(name, _shown(_live_frames(text, size), to_person), to_person.say)
+    return LiveImages(name, _shown(begun(_live_frames(text, size)), to_person), to_person.say)
 
 
 def _shown(frames: Iterator[tuple[float, Image]], to_person: Prompts) -> Iterator[tuple[float, Image]]:

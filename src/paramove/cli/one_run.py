@@ -36,6 +36,7 @@ from paramove.supervision import (
     application,
     examined,
     load,
+    missing_files,
     overlay_folders,
 )
 from paramove.workspace import Workspace
@@ -133,6 +134,7 @@ def _found(launch: Launch, environment: Environment, workspace: Workspace) -> li
         f"  workspace {workspace} ({workspace.digest})",
         f"  domain    {environment.domain}, sockets in {environment.sockets}",
         f"  python    {sys.executable}",
+        *(f"  missing   {one.path.name}: {one.about}; {one.typed}" for one in missing_files(launch, workspace)),
     ]
 
 

@@ -34,6 +34,7 @@ def prepared(launch: Launch, workspace: Workspace, pages: Path | None) -> int:
         if not attended or not _agreed():
             return exit_codes.INPUT_MISSING
         if code := _run(missing, workspace, pages):
+            typer.echo(f"{name} is still missing; the same command goes on from here", err=True)
             return code
         if not missing.path.exists():
             raise launch.error(("needs",), f"`{missing.typed}` did not write {missing.path}")

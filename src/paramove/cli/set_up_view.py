@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import sys
 import tempfile
@@ -10,7 +11,7 @@ import threading
 import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
@@ -19,6 +20,7 @@ from paramove.documents import printable
 if TYPE_CHECKING:
     from paramove.dashboard import SetUpPage
 
+Item = TypeVar("Item")
 FOLDER_VARIABLE = "PARAMOVE_SET_UP_PAGE"
 """Folder that commands share, one after the other, so that one page in the browser follows them all."""
 ViewOption = Annotated[bool, typer.Option("--view", help="also show picture and prompts on a page in the browser")]
@@ -47,6 +49,11 @@ class Prompts:
             typer.echo(printable(happened))
         if self.page is not None:
             self.page.add(happened)
+
+
+def begun(items: Iterator[Item]) -> Iterator[Item]:
+    """The same, with the first one there already: a camera that is missing is noticed before the first prompt."""
+    return itertools.chain(list(itertools.islice(items, 1)), items)
 
 
 def open_where_displayed(link: str) -> None:

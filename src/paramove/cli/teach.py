@@ -56,7 +56,7 @@ def webcam(
     cannot be written; 78 there is a set already, or one camera and no person; 130 Ctrl-C: what has ended is in the set.
     """
     from paramove.action_space import read_person
-    from paramove.cameras import Board, measured_cameras
+    from paramove.cameras import Board, check_square_of, measured_cameras
     from paramove.cli.calibrate import length
     from paramove.cli.webcam import seen_by
     from paramove.demonstrations import TaughtSet
@@ -69,7 +69,9 @@ def webcam(
         taught = TaughtSet(
             folder, action, subject, "performed before cameras; theta is the touched position", append=append
         )
-        places = board_targets(Board(length(square, "--square")).corners())
+        side = length(square, "--square")
+        check_square_of(cameras, side)
+        places = board_targets(Board(side).corners())
         who = None if person is None else read_person(person)
         sizes, shoulder = (None, None) if who is None else (who.sizes, who.shoulder)
         teacher = WebcamTeacher(calibrated, places, taught, sizes=sizes, shoulder=shoulder)
@@ -78,9 +80,9 @@ def webcam(
                 _lead(teacher, seen_by(calibrated, source, prompts=to_person), to_person)
         except KeyboardInterrupt:
             raise ended(f"{folder}: {len(taught.written)} movements", exit_codes.by_signal(signal.SIGINT)) from None
-    typer.echo(f"{folder}: {len(taught.written)} new; train a model with `paramove train {folder}`")
     if not teacher.finished:
-        raise typer.Exit(exit_codes.FAILURE)
+        raise ended(f"{len(taught.written)} new movements; --append goes on with the others", exit_codes.FAILURE)
+    typer.echo(f"{folder}: {len(taught.written)} new; train a model with `paramove train {folder}`")
 
 
 def _lead(teacher: WebcamTeacher, key_points: Iterator[tuple[str, int, BodyKeyPoints]], to_person: Prompts) -> None:

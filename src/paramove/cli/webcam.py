@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from paramove.cli.demos_options import ended
-from paramove.cli.set_up_view import Prompts, ViewOption, prompts
+from paramove.cli.set_up_view import Prompts, ViewOption, begun, prompts
 from paramove.documents import exit_codes
 
 if TYPE_CHECKING:
@@ -126,12 +126,14 @@ def person(
     write; 78 a wrong length, a damaged network, or images of no use.
     """
     from paramove.action_space import Person, write_person
-    from paramove.cameras import measured_cameras
+    from paramove.cameras import check_square_of, measured_cameras
     from paramove.cli.calibrate import length
     from paramove.documents import InputError
     from paramove.observation import checked_networks
 
     try:
+        if (square, distance, height) == (None, None, None):
+            typer.echo("no --square, --distance or --height: a mean adult of 1.70 m is assumed")
         camera = measured_cameras(Path(), cameras)[0]
         far = None if distance is None else length(distance, "--distance")
         tall = None if height is None else length(height, "--height")
@@ -141,6 +143,7 @@ def person(
         with prompts("Measure a person", view) as to_person:
             images = _images(camera, source, to_person) if live else None
             if square is not None:
+                check_square_of(cameras, length(square, "--square"))
                 far = _at_chest(camera, images, length(square, "--square"), to_person)
             arm = _measured(camera, source, images, to_person, far, tall)
         sizes = {"upper_arm": arm.upper_arm, "forearm": arm.forearm, "hand": arm.hand}
@@ -150,6 +153,11 @@ def person(
     except OSError as error:
         raise ended(f"{error.filename or out}: {error.strerror}", exit_codes.PERMISSION) from error
     typer.echo(f"{out}: written; the shoulder is in the frame of the table")
+
+
+def as_source(text: str) -> str:
+    """A camera may be named by its path or number alone."""
+    return f"device:{text}" if text.isdigit() or text.startswith("/dev/") else text
 
 
 def _measured(
@@ -175,7 +183,7 @@ def _measured(
 def _images(camera: CalibratedCamera, source: str, to_person: Prompts) -> Iterator[tuple[CalibratedCamera, int, Image]]:
     from paramove.observation import images_of
 
-    images = images_of([camera], [source])
+    images = begun(images_of([camera], [as_source(source)]))
     return images if to_person.page is None else to_person.page.passing(images, camera.name)
 
 
@@ -224,8 +232,8 @@ def seen_by(
     prompts = prompts or Prompts()
     page = prompts.page
     if images is None:
-        images = images_of(cameras, sources)
+        images = begun(images_of(cameras, [as_source(source) for source in sources]))
         images = images if page is None else page.passing(images, cameras[0].name)
-    offline = not any(source.startswith("device:") for source in sources)
+    offline = not any(as_source(source).startswith("device:") for source in sources)
     found = detected_key_points(images, lambda trouble: prompts.add(trouble or "all is well again"), offline=offline)
     return found if page is None else page.drawing(found, cameras[0].name)

@@ -47,6 +47,12 @@ class TaughtSet:
         if self._labels.exists():
             self._check_existing(append)
 
+    @property
+    def positions(self) -> list[tuple[float, ...]]:
+        """Theta of each movement of this action by this person in the set."""
+        there = load_labels(self._labels).file.segments if self._labels.exists() else []
+        return [tuple(one.theta) for one in there if (one.action, one.subject) == (self._action, self._subject)]
+
     def _check_existing(self, append: bool) -> None:
         if not append:
             raise DemonstrationError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import subprocess
 import sys
@@ -101,11 +102,16 @@ def has_heavy(folder: Path | None = None) -> bool:
 def fetch_networks(file: Path | None = None, folder: Path | None = None, package: Package = USUAL) -> Path:
     """Stores the networks of a package's file, by default one that is downloaded with its progress; their folder.
 
+    What is stored already and sound is not downloaded again.
+
     Raises InputError for a file that cannot be had or is another one.
     """
     folder = default_folder() if folder is None else folder
     if file is not None:
         _store(file, folder, package)
+        return folder
+    with contextlib.suppress(InputError):
+        _checked(folder, package)
         return folder
     with tempfile.TemporaryDirectory() as temporary:
         try:

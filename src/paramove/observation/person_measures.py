@@ -31,6 +31,8 @@ HANGS_WITHIN = np.radians(9.0)
 """Deviation of a resting upper arm from the vertical, to either side: of ten seated persons."""
 SEARCHED_M = np.linspace(-0.3, 0.3, 121)
 """Errors of the network's depths that are tried."""
+UNUSUAL = 3.0
+"""An arm whose bones are both longer than this many deviations from the usual is not as far away as given."""
 RESTING_IMAGES = 9
 """The first so many images show the resting arm."""
 
@@ -92,6 +94,11 @@ def measured_arm(
     measured = _lengths(_points(camera, detected, rays, along))
     usual_sd = usual * (ANY_HEIGHT_SD if height is None else HEIGHT_SD)
     measured_sd = np.hypot(LENGTHS_SD, deviation * usual)
+    if ((measured - usual) / np.hypot(usual_sd, measured_sd) > UNUSUAL).all():
+        raise InputError(
+            f"the arm seems to be {100.0 * measured.sum():.0f} cm long to the wrist, about "
+            f"{100.0 * usual.sum():.0f} cm expected: is the distance right?"
+        )
     weights = np.array([usual_sd**-2, measured_sd**-2])
     upper_arm, forearm = (weights * [usual, measured]).sum(axis=0) / weights.sum(axis=0)
     lengths = {"upper_arm": float(upper_arm), "forearm": float(forearm), "hand": HAND_OF_FOREARM * float(forearm)}

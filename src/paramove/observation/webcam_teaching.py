@@ -18,7 +18,7 @@ from paramove.demonstrations import DemonstrationError, TaughtSet, moved_part
 from paramove.documents import Floats, InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.arm_movement import HAND, SHOULDER, WRIST, ArmMovement, reconstructed
-from paramove.observation.body_key_points import BodyKeyPoints
+from paramove.observation.body_key_points import SIDES, BodyKeyPoints
 
 POINT_NAMES = ("shoulder", "other_shoulder", "elbow", "wrist", "knuckle", "index", "thumb")
 OTHER_SHOULDER = np.array([0.0, 0.36, 0.0])
@@ -35,9 +35,13 @@ TOUCH_S = 0.4
 """The last part of a movement in which the fingertip is at its target."""
 MAX_OFF_M = 0.25
 """A fingertip that appears farther than this from the position where it should be touches another one."""
+MAX_ASIDE_M = 0.10
+"""A fingertip that a picture shows farther than this beside the position touches another one."""
 MAX_STRANGE = 0.3
 """Fraction of the images of a movement that may show something else than this arm."""
 LONGEST_S = 10.0
+SAME_M = 0.01
+"""Positions that are nearer to each other are one."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ class WebcamTeacher:
     Args:
         cameras: One or more calibrated cameras, which stand still.
         targets: Positions to touch in turn, (N, 3), m, in the world, and their names.
-        taught: The set that the movements go to.
+        taught: The set that the movements go to. Positions of this action that it has already are not requested.
         sizes: Of the person's arm. shoulder: where it rests, (3,), m; both are needed with one camera.
         rate_hz: Of the cameras.
 
@@ -69,7 +73,12 @@ class WebcamTeacher:
         if not targets:
             raise InputError("no position to touch given: expected at least one")
         self._cameras = tuple(cameras)
-        self._targets = list(targets.items())
+        done = [np.asarray(theta) for theta in taught.positions]
+        self._targets = [
+            (name, place)
+            for name, place in targets.items()
+            if not any(np.linalg.norm(place - theta) < SAME_M for theta in done)
+        ]
         self._taught, self._sizes, self._shoulder = taught, sizes, shoulder
         self._names = [camera.name for camera in cameras]
         self._views = AlignedViews[BodyKeyPoints](self._names, 1.0 / rate_hz)
@@ -77,7 +86,7 @@ class WebcamTeacher:
         self._resting: Floats | None = None
         self._is_out = False
         self._done = 0
-        self.prompt = f"let your right arm hang; then touch {self._targets[0][0]} with the fingertip, and hold it there"
+        self._ask(0)
 
     @property
     def finished(self) -> bool:
@@ -151,8 +160,17 @@ class WebcamTeacher:
             raise InputError(
                 f"the fingertip ends {100.0 * off:.0f} cm from the position, as detected: was it another one?"
             )
-        touched = target, times[-1] - TOUCH_S
-        return known(touched=touched)
+        begins_s = times[-1] - TOUCH_S
+        for camera, row, sides in zip(self._cameras, points, free.sides, strict=True):
+            aside = _aside(camera, target, [
+                one.positions[side] for one, side, at in zip(row, sides, times, strict=True)
+                if one is not None and 0 <= side < len(SIDES) and at >= begins_s
+            ])  # fmt: skip
+            if aside > MAX_ASIDE_M:
+                raise InputError(
+                    f"{camera.name} shows the fingertip {100.0 * aside:.0f} cm beside the position: was it another one?"
+                )
+        return known(touched=(target, begins_s))
 
     def _ask(self, number: int) -> None:
         self._done = number
@@ -160,7 +178,10 @@ class WebcamTeacher:
             self.prompt = "all positions are touched"
             return
         name = self._targets[number][0]
-        self.prompt = f"{number + 1} of {len(self._targets)}: let the arm hang; then touch {name}, and hold it there"
+        self.prompt = (
+            f"{number + 1} of {len(self._targets)}: let your right arm hang; then touch {name} with the fingertip, and "
+            "hold it there"
+        )
 
 
 def board_targets(corners: ArrayLike) -> dict[str, Floats]:
@@ -172,6 +193,17 @@ def board_targets(corners: ArrayLike) -> dict[str, Floats]:
     grid = low[:2] + np.array(fractions) * (high - low)[:2]
     nearest = [int(np.linalg.norm(points[:, :2] - place, axis=1).argmin()) for place in grid]
     return {f"the {name} corner": points[row] for name, row in zip(names, nearest, strict=True)}
+
+
+def _aside(camera: CalibratedCamera, target: Floats, arms: Sequence[Floats]) -> float:
+    """How far beside a position the fingertip of arms (4, 2), px, is in a picture, at its distance, m; 0 if unknown."""
+    tips = np.array([2.0 * arm[HAND] - arm[WRIST] for arm in arms]).reshape(-1, 2)
+    tips = tips[np.isfinite(tips).all(axis=1)]
+    if not len(tips):
+        return 0.0
+    ahead = float(camera.camera_from_world[2, :3] @ target + camera.camera_from_world[2, 3])
+    off = np.median(tips, axis=0) - camera.project(target)
+    return float(np.linalg.norm(off) * ahead / camera.matrix[0, 0])
 
 
 def body_points(movement: ArmMovement) -> Floats:
