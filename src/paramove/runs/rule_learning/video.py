@@ -1,4 +1,4 @@
-"""The demo video of a run: VP9 in mp4, which browsers play."""
+"""The demo video of a run."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
     """Write `demo.mp4` into the run's folder, with a progress bar; None if the view was not recorded (headless).
 
     Raises:
-        VideoError: There is no VP9 encoder.
+        VideoError: There is no encoder.
     """
     run = evaluation.run
     number = sum(time_s <= run.end_s for time_s in view_times(run.folder))
