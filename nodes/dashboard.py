@@ -25,7 +25,7 @@ class Config(NodeConfig):
     title: str = Field("paramove", max_length=80)
     port: int = Field(0, ge=0, le=65535)
     robot: RobotFolder | None = None
-    surface: Surface = Surface()
+    surface: Surface | None = None
     texts: Texts = Texts()
 
 

@@ -85,6 +85,10 @@ class Surface(BaseModel):
     object_height: float = 0.050
 
 
+ARM_SURFACE = Surface(x=(0.0, 0.35), y=(-0.2, 0.2), z=0.0, object_radius=0.0125)
+"""Of a servo arm, in the frame of its base."""
+
+
 class Texts(BaseModel):
     """Words of the application.
 
@@ -105,7 +109,7 @@ class LivePicture:
     Args:
         robot: Its shape, joints and base pose; None for a run without one.
         title: Of the page.
-        surface: The working surface and the objects on it.
+        surface: The working surface and the objects on it; None: that of a robot of this kind.
         texts: Words of the application.
         side: Arm whose shoulder's frame positions are in; with a servo arm it is the base's.
         begun_ns: When the run began, by the bus clock.
@@ -116,13 +120,14 @@ class LivePicture:
         self,
         robot: RobotDescription | None,
         title: str,
-        surface: Surface,
+        surface: Surface | None = None,
         texts: Texts | None = None,
         *,
         side: str = "right",
         begun_ns: int = 0,
         wall_s: Callable[[], float] = time.monotonic,
     ) -> None:
+        surface = surface or (Surface() if robot is None or robot.chain is None else ARM_SURFACE)
         self._robot = None if robot is None else _DrawnRobot(robot, surface, side)
         self._estimates = Estimates((surface.x, surface.y))
         self._nodes = NodeTable()

@@ -108,6 +108,7 @@ const SHOW = {
 
 function showRules(objects) {
   const names = Object.keys(objects);
+  $("rules").closest(".card").hidden = !names.length && !state.page?.stages.length;
   $("rules").replaceChildren(...names.map((name) => {
     const row = document.createElement("tr"), object = objects[name], swatch = document.createElement("span"), first = row.insertCell();
     if (name === state.pointed) row.className = "pointed";
