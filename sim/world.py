@@ -47,7 +47,8 @@ class World:
         joints = [model.joint(name) for name in description.joint_names]
         self._qpos_index = np.array([joint.qposadr[0] for joint in joints])
         self._dof_index = np.array([joint.dofadr[0] for joint in joints])
-        self._actuators = np.array([model.actuator(name).id for name in description.joint_names])
+        driven = description.joint_names if description.chain is None else ()  # servos bring their own torques
+        self._actuators = np.array([model.actuator(name).id for name in driven], dtype=np.intp)
         self._body = {name: model.body(name).id for name in (*tool_box.COLOURS, "box", scene.HAND)}
         self._mocap = {name: int(model.body_mocapid[self._body[name]]) for name in ("box", scene.HAND)}
         self._weld = {name: model.equality(f"hold_{name}").id for name in tool_box.COLOURS}

@@ -67,3 +67,11 @@ def test_an_arm_that_is_a_folder_reaches_and_relocates(launcher, tmp_path):
     results = json.loads((launcher.latest / "run.json").read_text())["tasks"]
     assert [one["task"] for one in results] == ["reach", "place"]
     assert all(one["good"] for one in results), results
+
+
+@pytest.mark.slow
+def test_it_puts_the_object_where_a_person_points(launcher, tmp_path):
+    options = ["--headless", "--robot", str(described(tmp_path)), "--set", "relocator.places=1"]
+    code, shown = launcher.run("relocate_by_pointing", *options)
+    assert code == 0, shown
+    assert json.loads((launcher.latest / "run.json").read_text())["good"] == 1
