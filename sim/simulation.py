@@ -82,7 +82,7 @@ class SimulatedRobot(Protocol):
         """What it reports on the bus."""
 
     def commanded_gripper(self) -> Floats | None:
-        """Gripper as commanded, [3], frame of the tool box's measures, m; None if nobody knows."""
+        """Gripper as commanded, [3], frame of the tool box's measures, m; None if it is unknown."""
 
     def close(self) -> None:
         """Disconnects."""

@@ -30,8 +30,8 @@ def test_picture_arms_and_prompt_reach_a_browser(tmp_path):
             state = json.loads(live.recv(WAIT_S))
             assert state["page"]["title"] == "Measure a person"
             assert not state["page"]["robot"]
-            page.say("let your arm hang")
-            page.add("the board is detected")
+            page.prompt("let your arm hang")
+            page.report("the board is detected")
             points = [("one", 0, arms()), ("two", 0, BodyKeyPoints.nobody())]
             assert list(page.drawing(iter(points), "one")) == points
             images = [(camera, 0, IMAGE) for camera in reversed(CAMERAS)]

@@ -165,7 +165,7 @@ def _calibrated(texts: Sequence[str], board: Board, size: tuple[int, int], to_pe
         typer.echo(f"  {remark}")
     placed = []
     if any(_is_live(text) for text in texts):
-        to_person.say("now lay the board on the table as printed on it, in view of all cameras, and leave it there")
+        to_person.prompt("now lay the board on the table as printed on it, in view of all cameras, and leave it there")
     for source, lens in zip(sources, lenses, strict=True):
         views = source.table().views
         check_square(board, [*views_of_all, *views])
@@ -230,7 +230,7 @@ def _source(text: str, size: tuple[int, int], to_person: Prompts) -> ImageSource
     if not _is_live(text):
         return file_source(Path(text))
     name = f"camera{text}" if text.isdigit() else Path(text).name
-    return LiveImages(name, _shown(begun(_live_frames(text, size)), to_person), to_person.say)
+    return LiveImages(name, _shown(begun(_live_frames(text, size)), to_person), to_person.prompt)
 
 
 def _shown(frames: Iterator[tuple[float, Image]], to_person: Prompts) -> Iterator[tuple[float, Image]]:

@@ -1,4 +1,4 @@
-"""What a person is told while setting something up: in the terminal, and on a page in the browser if wanted."""
+"""Prompts to a person who sets something up: in the terminal, and on request on a page in the browser."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ class Prompts:
     def __init__(self, page: SetUpPage | None = None) -> None:
         self.page = page
 
-    def say(self, sentence: str, happened: str = "") -> None:
+    def prompt(self, sentence: str, happened: str = "") -> None:
         """What has just happened, if anything, and what to do now."""
-        self.add(happened)
+        self.report(happened)
         typer.echo(printable(sentence))
         if self.page is not None:
-            self.page.say(sentence)
+            self.page.prompt(sentence)
 
-    def add(self, happened: str) -> None:
+    def report(self, happened: str) -> None:
         """What has just happened; nothing for ""."""
         if happened:
             typer.echo(printable(happened))
         if self.page is not None:
-            self.page.add(happened)
+            self.page.report(happened)
 
 
 def begun(items: Iterator[Item]) -> Iterator[Item]:
@@ -64,7 +64,7 @@ def open_where_displayed(link: str) -> None:
 
 @contextlib.contextmanager
 def prompts(title: str, view: bool) -> Iterator[Prompts]:
-    """While the block lasts the page is there, if `view` or the launch of a run wants it."""
+    """While the block lasts the page is there, if `view` or the launch of a run requests it."""
     shared = os.environ.get(FOLDER_VARIABLE)
     if not view and not shared:
         yield Prompts()

@@ -87,10 +87,10 @@ def webcam(
 
 def _lead(teacher: WebcamTeacher, key_points: Iterator[tuple[str, int, BodyKeyPoints]], to_person: Prompts) -> None:
     """Until all positions are touched, or the images end."""
-    to_person.say(teacher.prompt)
+    to_person.prompt(teacher.prompt)
     for camera, captured_ns, points in key_points:
         happened = teacher.see(camera, captured_ns, points)
         if happened:
-            to_person.say(teacher.prompt, happened)
+            to_person.prompt(teacher.prompt, happened)
         if teacher.finished:
             return

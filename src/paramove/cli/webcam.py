@@ -91,7 +91,7 @@ def look(
                     latest_s = captured_ns * 1e-9
                     aside, up = np.degrees(np.arctan2(x, np.hypot(y, z))), np.degrees(np.arctan2(-y, np.hypot(x, z)))
                     towards = "towards the camera" if z < 0.0 else "away from the camera"
-                    to_person.say(
+                    to_person.prompt(
                         f"right arm: {abs(aside):.0f} deg to the picture's {'right' if aside > 0 else 'left'}, "
                         f"{abs(up):.0f} deg {'up' if up > 0 else 'down'}, {towards}; uncalibrated: directions only"
                     )
@@ -168,13 +168,13 @@ def _measured(
     from paramove.observation import PersonSetUp
 
     set_up = PersonSetUp(camera, distance=distance, height=height)
-    to_person.say(set_up.prompt)
+    to_person.prompt(set_up.prompt)
     for name, _, points in seen_by([camera], [source], images, to_person):
         if name != camera.name:
             continue
         happened = set_up.see(points)
         if happened:
-            to_person.say(set_up.prompt, happened)
+            to_person.prompt(set_up.prompt, happened)
         if set_up.arm is not None:
             return set_up.arm
     raise ended("the images ended before the person was measured", exit_codes.FAILURE)
@@ -199,7 +199,7 @@ def _at_chest(
 
     if images is None:
         raise InputError("--square needs images of the board: a recording of key points has none")
-    to_person.say("hold the board flat at your chest, towards the camera")
+    to_person.prompt("hold the board flat at your chest, towards the camera")
     finder, depths = BoardFinder(), list[float]()
     for _, _, image in images:
         view = finder.find(image)
@@ -210,7 +210,7 @@ def _at_chest(
     if len(depths) < BOARD_LOOKS:
         raise InputError("the images ended before the board was detected at the chest")
     far = float(np.median(depths)) + CHEST_M
-    to_person.say(f"your shoulder is {far:.2f} m from the camera; put the board away")
+    to_person.prompt(f"your shoulder is {far:.2f} m from the camera; put the board away")
     return far
 
 
@@ -235,5 +235,5 @@ def seen_by(
         images = begun(images_of(cameras, [as_source(source) for source in sources]))
         images = images if page is None else page.passing(images, cameras[0].name)
     offline = not any(as_source(source).startswith("device:") for source in sources)
-    found = detected_key_points(images, lambda trouble: prompts.add(trouble or "all is well again"), offline=offline)
+    found = detected_key_points(images, lambda trouble: prompts.report(trouble or "all is well again"), offline=offline)
     return found if page is None else page.drawing(found, cameras[0].name)

@@ -18,7 +18,7 @@ MAX_SPEECH = 12
 MAX_RESULTS = 8
 POINTING_DISPLAY_S = 3.0
 POINTING_KNOWN_CM = 6.0
-"""Standard deviation of a target from which on it is shown."""
+"""Largest standard deviation of a target that is displayed."""
 _ENDED = frozenset({RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED})
 _PUTS_DOWN = frozenset({RelocationGoal.KIND_RELOCATE, RelocationGoal.KIND_PLACE_HELD})
 _GESTURES = {

@@ -57,11 +57,11 @@ class SetUpPage:
                 self._server.show({"arm": drawn_arms(points)})
             yield name, captured_ns, points
 
-    def say(self, sentence: str) -> None:
+    def prompt(self, sentence: str) -> None:
         """Shows what to do now."""
         self._server.show({"words": [{"sentence": sentence}]})
 
-    def add(self, happened: str) -> None:
+    def report(self, happened: str) -> None:
         """Shows what has just happened, beside that."""
         self._server.show({"stage": {"step": happened}})
 

@@ -94,8 +94,9 @@ def reconstructed(
         for number, camera in enumerate(cameras):
             for frame, detected in enumerate(key_points[number]):
                 if detected is not None and detected.has_person:
-                    seen = (frame, points[frame], detected, model, too_deep[number])
-                    sides[number, frame] = _see(system, comparing, camera, *seen)
+                    sides[number, frame] = _see(
+                        system, comparing, camera, frame, points[frame], detected, model, too_deep[number]
+                    )
             too_deep[number] = _depth_errors(camera, points, key_points[number], sides[number])
         if sizes is not None:
             for bone, length in enumerate((sizes.upper_arm, sizes.forearm, 0.5 * sizes.hand)):
