@@ -9,8 +9,8 @@ from paramove.documents.input_error import InputError
 from paramove.observation import ArmObserver, ArmSizes, fitted_poses
 from paramove.observation.contour_kernels import new_contour, trace
 from paramove.observation.silhouette_kernels import Camera, draw_arm, new_canvas, project_ellipsoid, wipe
-from sim.human import ArmSilhouette
 from tests.observation.views import camera_at, four_cameras, some_bent_poses, some_poses
+from tests.sim.arm_silhouette import ArmSilhouette
 
 SIZES = ArmSizes()
 BODY = np.array([SIZES.forearm, SIZES.hand, 0.055, 0.042, 0.028, SIZES.hand_width, SIZES.hand_thickness])

@@ -10,7 +10,8 @@ from paramove.cameras.calibrated import CalibratedCamera
 from paramove.demonstrations.synthetic import RESTING_SHOULDER
 from paramove.observation.arm_body import ArmSizes
 from sim import human
-from sim.human import ArmSilhouette, PersonLook, camera_frame, tapered_capsule
+from sim.human import PersonLook, camera_frame, tapered_capsule
+from tests.sim.arm_silhouette import ArmSilhouette
 
 ROOT = Path(__file__).resolve().parents[2]
 SIZES = ArmSizes()

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from paramove.demonstrations.edge import strongly_nonlinear_movement
 from paramove.hmm import TrainingOptions
 from paramove.hmm.training import LikelihoodDecreaseWarning
 from paramove.phmm import MovementClassifier, NeuralPHMM, QuadraticPHMM
 from paramove.phmm.network.choice import Choice, _better, _left_out_errors
 from paramove.phmm.network.networks import StateNetworks, StateTargets, drawn_inner
 from tests.phmm.movements import numerical_gradient, shown, wave
+from tests.phmm.network.edge import strongly_nonlinear_movement
 from tests.phmm.table import RASTER_CM, table_movements
 
 PROPERTY = settings(max_examples=15, deadline=None, derandomize=True)
