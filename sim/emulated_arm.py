@@ -26,6 +26,8 @@ from paramove.documents import InputError
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.robots import RobotDescription
 
+NS_PER_STEP = 1_000_000
+
 
 class EmulatedArm:
     """Context manager for an emulated arm.
@@ -101,6 +103,12 @@ class EmulatedArm:
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
     ) -> None:
         self._open.close()
+
+    def run_to(self, steps: int) -> None:
+        """Lets a paced world run on to `steps` since the start, where no driver did; raises RuntimeError."""
+        self.emulator.check()
+        with self.emulator.lock:
+            self.emulator.run_to(steps * NS_PER_STEP)
 
     @property
     def detail(self) -> str:

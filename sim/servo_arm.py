@@ -12,8 +12,6 @@ from paramove.robots import RobotDescription
 from sim.emulated_arm import EmulatedArm
 from sim.world import World
 
-NS_PER_STEP = 1_000_000
-
 
 class ServoArm:
     """In its base pose at first, with torque.
@@ -44,9 +42,7 @@ class ServoArm:
     def run_to(self, world: World, steps: int, step: Callable[[], None]) -> None:
         """Lets the world run on where no driver did; raises RuntimeError."""
         assert self._arm is not None
-        self._arm.emulator.check()
-        with self._arm.emulator.lock:
-            self._arm.emulator.run_to(steps * NS_PER_STEP)
+        self._arm.run_to(steps)
 
     def messages(self, world: World, now_ns: int) -> Iterator[tuple[Topic, Any]]:
         """It reports over its port alone."""

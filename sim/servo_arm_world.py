@@ -9,11 +9,10 @@ from typing import Any
 from paramove.bus import Received, Topic, topics
 from paramove.msgs.truth_pb2 import TruthLayout
 from paramove.robots import RobotDescription
-from sim.emulated_arm import EmulatedArm
+from sim.emulated_arm import NS_PER_STEP, EmulatedArm
 from sim.simulation import step_of_tick
 
 MODEL_SCENE = Path("scene.xml")
-NS_PER_STEP = 1_000_000
 
 
 class ServoArmWorld:
@@ -50,9 +49,7 @@ class ServoArmWorld:
 
     def run_to_tick(self, tick: int) -> None:
         """Lets the world run where no driver did."""
-        self._arm.emulator.check()
-        with self._arm.emulator.lock:
-            self._arm.emulator.run_to(step_of_tick(tick) * NS_PER_STEP)
+        self._arm.run_to(step_of_tick(tick))
 
     def messages(self) -> Iterator[tuple[Topic, Any]]:
         """The truth."""

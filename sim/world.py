@@ -30,7 +30,7 @@ class World:
     """Physics of one seed's world.
 
     Positions that come in and go out are in the frame of the tool box's measures, that of HOAP-3's right shoulder,
-    unless the name says world.
+    unless the name has world in it.
 
     Args:
         looks: How it looks; lights and cameras are part of the model.

@@ -143,8 +143,9 @@ def person(
         with prompts("Measure a person", view) as to_person:
             images = _images(camera, source, to_person) if live else None
             if square is not None:
-                check_square_of(cameras, length(square, "--square"))
-                far = _at_chest(camera, images, length(square, "--square"), to_person)
+                side = length(square, "--square")
+                check_square_of(cameras, side)
+                far = _at_chest(camera, images, side, to_person)
             arm = _measured(camera, source, images, to_person, far, tall)
         sizes = {"upper_arm": arm.upper_arm, "forearm": arm.forearm, "hand": arm.hand}
         write_person(out, Person(shoulder=tuple(arm.shoulder), **sizes))
