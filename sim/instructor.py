@@ -64,6 +64,7 @@ class Instructor(Person):
         return {
             Speech.REQUEST_HAND_ME_AN_OBJECT: self._hand_over,
             Speech.REQUEST_LET_GO: self._let_go,
+            Speech.REQUEST_STAND_OBJECT_AT_START: self._stand_at_start,
             Speech.REQUEST_SHOW_RULES: self._show_rules,
             Speech.REQUEST_SHOW_RULE_AGAIN: self._show_again,
             Speech.REQUEST_POINT_AT_OBJECT: self._point,
@@ -95,6 +96,12 @@ class Instructor(Person):
         yield self.hand.move(self._into_hand(OVER_THE_ARM), seconds=(1.0, 2.4))
         self.doing = f"holds {held} in the robot's hand"
         yield self.hand.move(self._into_hand(0.0), seconds=(1.0, 1.5), straight=True)
+
+    def _stand_at_start(self, _: str) -> Script:
+        name = self._to_hand_over()
+        self.doing = f"stands {name} at the mark"
+        yield from self.hand.bring(name, np.array(places.START))
+        yield from self.withdraw()
 
     def _let_go(self, _: str) -> Script:
         if self.table.held_by_instructor is None:

@@ -13,12 +13,11 @@ from sim import tool_box
 from sim.arm import Arm
 from sim.hand import Hand, Script, Step
 from sim.person import Person
+from sim.places import START
 from sim.sights import Sights, Table
 from sim.small_person import POINTED_ABOVE_PLANE, SCALE, SmallPerson, table_from_shoulder
 
 OBJECT = "yellow"
-START = (0.165, -0.02)
-"""Marked on the table: where the object stands at first, and where the person stands it when the robot needs help."""
 AREA_X, AREA_Y = (0.130, 0.186), (-0.100, 0.065)
 """Targets are this far inside the robot's working area, m, shoulder frame."""
 FREE_OF_ROBOT = 0.07

@@ -9,6 +9,8 @@ import numpy as np
 from paramove.documents import Floats
 from sim import tool_box
 
+START = (0.165, -0.02)
+"""Marked on the table: where a person stands an object for the robot, at first and where it needs help."""
 STRIP_X = (0.168, 0.186)
 STRIP_Y = (-0.100, 0.065)
 MIN_GAP = 0.050  # between the axes of two cylinders

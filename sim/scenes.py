@@ -13,7 +13,8 @@ from sim.hoap3 import Hoap3
 from sim.instructor import Instructor
 from sim.looks import Looks
 from sim.person import Person
-from sim.place_instructor import OBJECT, START, PlaceInstructor
+from sim.place_instructor import OBJECT, PlaceInstructor
+from sim.places import START
 from sim.pointing_world import PointingWorld
 from sim.servo_arm import ServoArm
 from sim.servo_arm_world import ServoArmWorld

@@ -59,6 +59,7 @@ class Story:
         self.calibrated = False
         self.answers: dict[int, Callable[[str], None]] = {
             Speech.REQUEST_HAND_ME_AN_OBJECT: lambda _: self.hand_over("yellow"),
+            Speech.REQUEST_STAND_OBJECT_AT_START: lambda _: self.put(1.0, "green", options.start or (0.0, 0.0)),
             Speech.REQUEST_LET_GO: lambda _: self.later(1.0, self.hand, False),
             Speech.REQUEST_SHOW_RULES: lambda _: self.show(*OPENINGS),
             Speech.REQUEST_SHOW_RULE_AGAIN: lambda name: self.show(name),

@@ -375,6 +375,41 @@ def test_nothing_in_the_hand_makes_it_ask_again() -> None:
     assert kinds(story) == ["REST", "OFFER_HAND"]
 
 
+START = OPTIONS.model_copy(update={"start": (0.165, -0.02), "frame": "arm_base"})
+
+
+def test_a_hand_that_cannot_be_given_an_object_fetches_it_from_a_marked_position() -> None:
+    story = Story(options=START)
+    story.run_to(LEARN)
+    assert story.requests() == ["STAND_OBJECT_AT_START", "SHOW_RULES"]
+    assert kinds(story) == ["REST", "RELOCATE", "RELOCATE", "RELOCATE", "RELOCATE"]
+    assert {goal.object for goal in story.goals[1:]} == {"green"}
+    assert [at_place(goal) for goal in story.goals[1:]] == [START.start, *START.corners[:3]]
+    assert [at_place(goal, "to") for goal in story.goals[1:]] == list(START.corners)
+    (calibration,) = story.calibrations
+    assert calibration.plane_frame == "arm_base"
+
+
+def test_an_object_counts_as_stood_when_it_rests_and_the_hand_has_left() -> None:
+    story = Story(options=START)
+    story.answers[Speech.REQUEST_STAND_OBJECT_AT_START] = lambda _: None
+    story.run(until=lambda: "STAND_OBJECT_AT_START" in story.requests())
+    story.hand(True)
+    story.stand("blue", START.start)
+    assert not story.run(5.0, until=lambda: "RELOCATE" in kinds(story))
+    story.hand(False)
+    assert story.run(5.0, until=lambda: "RELOCATE" in kinds(story))
+    assert story.goals[-1].object == "blue"
+
+
+def test_where_nothing_is_stood_it_is_asked_for_again() -> None:
+    story = Story(options=START)
+    story.answers[Speech.REQUEST_STAND_OBJECT_AT_START] = lambda _: None
+    story.run(70.0)
+    assert story.requests().count("STAND_OBJECT_AT_START") >= 2
+    assert kinds(story) == ["REST"]
+
+
 def test_a_placed_object_that_is_not_seen_is_asked_for_anew() -> None:
     story = Story()
     story.run(until=lambda: "TAKE" in kinds(story))

@@ -25,7 +25,7 @@ def reaching(name: str) -> ServoArmReaching:
 
 def pick_and_place(name: str, source: ArrayLike, place: ArrayLike) -> PlannedMotion:
     """Both motions of a relocation."""
-    fetch = reaching(name).fetch(source)
+    fetch = reaching(name).fetch(source, target=place)
     return joined(fetch, reaching(name).deliver(fetch.end, place))
 
 

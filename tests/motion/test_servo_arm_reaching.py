@@ -8,7 +8,7 @@ import pytest
 from paramove.motion.clearance import MAX_STANDING, ClearanceChecker, UprightCylinder, WorkSurface
 from paramove.motion.planned_motion import PlannedMotion, RestPose
 from paramove.motion.plans import NoPlanError
-from paramove.motion.servo_arm_reaching import ServoArmReaching
+from paramove.motion.servo_arm_reaching import FINGER_GAP_M, ServoArmReaching
 from paramove.robots.description import DescriptionError
 from paramove.robots.planar_arm import OutOfReachError
 from paramove.safety.trajectory_check import check_trajectory
@@ -37,6 +37,14 @@ class Oracle:
     def hand(self, row: np.ndarray) -> np.ndarray:
         self.scene.place(self.whole(row))
         return self.scene.data.site(self.chain.sites.end_effector).xpos.copy()
+
+    def object_in(self, row: np.ndarray, gap: float) -> np.ndarray:
+        """Where an object of 20 mm is that is so far from the face of a finger that does not move."""
+        hand, face = self.hand(row), self.chain.fixed_finger
+        if face is None:
+            return hand
+        left = self.scene.data.site(self.chain.sites.end_effector).xmat.reshape(3, 3)[:, 1]
+        return hand + (face - np.sign(face) * (0.010 + gap)) * left
 
     def touches_table(self, row: np.ndarray) -> bool:
         self.scene.place(self.whole(row))
@@ -92,8 +100,12 @@ def test_picks_and_places_within_limits_and_clear_of_the_table(name: str) -> Non
         assert list(at) == [
             "approach", "lower", "grasp", "lift", "carry", "place", "release", "withdraw", "retreat"
         ]  # fmt: skip
-        for phase, point in (("grasp", source), ("lift", source), ("release", place)):
-            assert np.linalg.norm(oracle.hand(at[phase]) - point) < 1e-6
+        for phase, point, gap in (
+            ("grasp", source, FINGER_GAP_M),
+            ("lift", source, FINGER_GAP_M),
+            ("release", place, 0),
+        ):
+            assert np.linalg.norm(oracle.object_in(at[phase], gap) - point) < 2e-4
         np.testing.assert_allclose(motion.angles[-1], plan.base_angles, rtol=0, atol=1e-12)
 
 
@@ -118,6 +130,21 @@ def test_the_hand_points_down_where_it_grasps_if_it_can(name: str) -> None:
     pitch = np.rad2deg(description(name).chain.kinematics.forward(motion.angles[:, :-1]).pitch)
     starts = {phase: round(start / 0.01) for phase, start in motion.phases}
     np.testing.assert_allclose(pitch[[starts["grasp"], starts["release"]]], 90.0, rtol=0, atol=1e-6)
+
+
+def test_an_object_is_put_down_with_the_pitch_with_which_it_was_grasped() -> None:
+    """Or else it would stand askew: it is upright in the hand that grasps it. The Koch reaches far only with less."""
+    near, far = (0.15, 0.0, GRASP_Z), (0.21, 0.05, GRASP_Z)
+    plan, kinematics = reaching("koch_v1_1"), description("koch_v1_1").chain.kinematics
+    for target in (far, None):
+        fetch = plan.fetch(near, target=target)
+        deliver = plan.deliver(plan.hold(fetch.end, (0.13, -0.11, 0.10)).end, far)
+        pitches = []
+        for motion, phase in ((fetch, "grasp"), (deliver, "release")):
+            start = dict(motion.phases)[phase]
+            pitches.append(float(kinematics.forward(motion.angles[round(start / 0.01)][:-1]).pitch))
+        assert pitches[0] < np.deg2rad(85)
+        np.testing.assert_allclose(pitches[1], pitches[0], rtol=0, atol=1e-6)
 
 
 @each_arm
@@ -164,11 +191,12 @@ def test_what_no_path_keeps_clear_of_is_named(name: str) -> None:
 @each_arm
 def test_what_it_holds_is_put_down_before_it_goes_home(name: str) -> None:
     plan = reaching(name)
-    lifted = plan.fetch((0.15, 0.05, GRASP_Z)).end
+    fetch = plan.fetch((0.15, 0.05, GRASP_Z))
+    lifted, grasped = fetch.end, fetch.gripper[round(dict(fetch.phases)["grasp"] / 0.01)]
     motion = plan.home(lifted, holding=True)
     assert [phase for phase, _ in motion.phases] == ["place", "release", "withdraw", "retreat"]
     released = motion.gripper[motion.holding][-1]
-    np.testing.assert_allclose(released, (0.15, 0.05, GRASP_Z), rtol=0, atol=1e-4)
+    np.testing.assert_allclose(released, grasped, rtol=0, atol=1e-4)
     np.testing.assert_allclose(motion.angles[-1], plan.base_angles, rtol=0, atol=1e-12)
     assert_playable(name, motion, lifted.angles)
 

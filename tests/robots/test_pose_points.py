@@ -35,6 +35,13 @@ def test_the_middle_of_the_fingers_is_the_end_effector(robot):
     np.testing.assert_allclose(middle, end, rtol=0.0, atol=1e-12)
 
 
+def test_the_fixed_finger_is_that_of_the_model():
+    model = mujoco.MjModel.from_xml_path(str(KOCH / "koch_v1_1.xml"))
+    finger, site = model.geom("static_finger"), model.site("end_effector")
+    face = finger.pos[1] + finger.size[1] - site.pos[1]
+    np.testing.assert_allclose(RobotDescription.load(KOCH).chain.fixed_finger, face, rtol=0.0, atol=1e-12)
+
+
 def test_elbow_and_wrist_are_on_the_axes_of_the_model(robot):
     """A point on a joint's axis: the line through the joint's anchor along its axis."""
     model = mujoco.MjModel.from_xml_path(str(robot.model_path))

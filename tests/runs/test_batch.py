@@ -29,6 +29,7 @@ def test_results_of_other_settings_are_not_used(tmp_path):
     result_file(tmp_path, 2).write_text(json.dumps(result(2, settings=["camera.width=100"])))
     assert list(finished(tmp_path, [0, 1, 2])) == [1]
     assert list(finished(tmp_path, [0, 1, 2], ["camera.width=100"])) == [2]
+    assert list(finished(tmp_path, [0, 1, 2], robot="koch_v1_1")) == []
 
 
 def test_totals_and_enough():

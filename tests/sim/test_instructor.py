@@ -76,6 +76,16 @@ def test_hands_over_an_object_below_the_gripper_and_lets_go(seed: int) -> None:
     assert story.instructor.doing == "waits"
 
 
+def test_stands_an_object_at_the_mark() -> None:
+    story = Story()
+    story.ask(Speech.REQUEST_STAND_OBJECT_AT_START)
+    story.run()
+    (standing,) = story.standing()
+    assert_allclose(standing, places.START, rtol=0, atol=1e-3)
+    assert story.table.held_by_instructor is None
+    assert_allclose(story.table.fingertip, places.IDLE_FINGERTIP, rtol=0, atol=1e-9)
+
+
 def test_hands_over_the_object_that_is_asked_for() -> None:
     story = Story()
     story.ask(Speech.REQUEST_HAND_ME_AN_OBJECT, "blue")

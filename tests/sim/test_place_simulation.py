@@ -4,7 +4,8 @@ import numpy as np
 
 from paramove.msgs.rule_pb2 import Speech
 from sim import tool_box
-from sim.place_instructor import OBJECT, START
+from sim.place_instructor import OBJECT
+from sim.places import START
 from sim.small_person import shoulder_from_table
 from tests.sim.conftest import simulated
 

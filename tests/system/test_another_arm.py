@@ -70,6 +70,13 @@ def test_an_arm_that_is_a_folder_reaches_and_relocates(launcher, tmp_path):
 
 
 @pytest.mark.slow
+def test_it_learns_rules_by_watching(launcher, tmp_path):
+    code, shown = launcher.run("rule_learning", "--headless", "--robot", str(described(tmp_path)), timeout_s=900)
+    assert code == 0, shown
+    assert launcher.truth()["unwanted_contacts"] == 0
+
+
+@pytest.mark.slow
 def test_it_puts_the_object_where_a_person_points(launcher, tmp_path):
     options = ["--headless", "--robot", str(described(tmp_path)), "--set", "relocator.places=1"]
     code, shown = launcher.run("relocate_by_pointing", *options)

@@ -13,3 +13,14 @@ def test_robot_learns_the_rules_and_applies_them(launcher):
     assert truth["placed"] == 3, truth
     assert truth["unwanted_contacts"] == 0, truth
     assert truth["deepest_penetration_mm"] <= 0.7, truth
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["koch_v1_1", "open_manipulator_x"])
+def test_a_servo_arm_calibrates_itself_and_begins_to_learn(launcher, robot):
+    """As far as its own corners, in lockstep; `test_another_arm.py` follows the story to its end."""
+    code, shown = launcher.run("rule_learning", "--robot", robot, "--headless", "--set", "simulator.max_duration_s=130")
+    assert code != 0
+    assert "Now I know where I see what I can reach" in shown
+    truth = launcher.truth()
+    assert truth["unwanted_contacts"] == 0, truth

@@ -1,10 +1,12 @@
 """Stage 1: the robot learns how the camera sees its working area (thesis 5.2.6, step 2).
 
-It is handed an object and places it at the corners of its working area, fetching it again each time. The image points
-and its own targets give the homography.
+It is handed an object, or fetches one from a marked position, and places it at the corners of its working area,
+fetching it again each time. The image points and its own targets give the homography.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from paramove.applications.options import Place
 from paramove.applications.stage import HAND_TIMEOUT_S, ApplicationState, Stage, cm
@@ -19,7 +21,7 @@ HAND_AWAY_S = 0.5
 
 
 class Calibrating(Stage):
-    """States: resting, offering, asking, taking, letting_go, placing, looking, helped (waiting for help)."""
+    """States: resting, then asking_to_stand or (offering, asking, taking, letting_go), placing, looking, helped."""
 
     stage = ApplicationStage.STAGE_CALIBRATE
 
@@ -42,6 +44,7 @@ class Calibrating(Stage):
         """One tick."""
         steps = {
             "resting": self._resting,
+            "asking_to_stand": self._asking_to_stand,
             "offering": self._offering,
             "asking": self._asking,
             "taking": self._taking,
@@ -57,8 +60,34 @@ class Calibrating(Stage):
         return self.app.options.corners[len(self._observations)]
 
     def _resting(self) -> None:
-        if self.app.goal_client.outcome is not None:
+        if self.app.goal_client.outcome is not None and self.app.options.start is not None:
+            self._ask_to_stand(self.app.options.start)
+        elif self.app.goal_client.outcome is not None:
             self._offer()
+
+    def _ask_to_stand(self, start: Place) -> None:
+        detail = f"Please stand an object at {cm(start)} and take your hand away."
+        self.app.speak(detail, Speech.REQUEST_STAND_OBJECT_AT_START)
+        self.go("asking_to_stand")
+
+    def _asking_to_stand(self) -> None:
+        start = self.app.options.start
+        assert start is not None
+        self._held = self._came_to_rest()
+        if self._held and self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S:
+            self._relocate(start)
+        elif self.for_s > self.app.options.ask_again_s:
+            self._ask_to_stand(start)
+
+    def _came_to_rest(self) -> str:
+        """The object that came to rest last since this state began, and has not moved for a while; "" if none."""
+        since = self.app.now_s - self.for_s
+        still = {
+            sighting.time_s: name
+            for name, sighting in self.app.table.objects.items()
+            if sighting.at_rest and sighting.time_s > since and self.app.now_s - sighting.time_s >= HELD_STILL_S
+        }
+        return still[max(still)] if still else ""
 
     def _offer(self) -> None:
         x, y, z = self.app.options.offer
@@ -90,14 +119,9 @@ class Calibrating(Stage):
         self.go("asking")
 
     def _asking(self) -> None:
-        since = self.app.now_s - self.for_s
-        held_still = [
-            name
-            for name, sighting in self.app.table.objects.items()
-            if sighting.at_rest and sighting.time_s > since and self.app.now_s - sighting.time_s >= HELD_STILL_S
-        ]
-        if held_still:
-            self._held = max(held_still, key=lambda name: self.app.table.objects[name].time_s)
+        held = self._came_to_rest()
+        if held:
+            self._held = held
             self.app.goal_client.start(RelocationGoal.KIND_TAKE, self.app.now_s, self._held)
             self.go("taking")
         elif self.for_s > self.app.options.ask_again_s:
@@ -147,14 +171,15 @@ class Calibrating(Stage):
     def _next_corner(self) -> ApplicationStage.Stage | None:
         if len(self._observations) == len(self.app.options.corners):
             return self._finish()
-        source = self.app.goals.position(self._observations[-1][0])
-        target = self.app.goals.position(self._corner)
-        self.app.goal_client.start(
-            RelocationGoal.KIND_RELOCATE, self.app.now_s, self._held, source, target, attempt=1 + self._missed
-        )
+        self._relocate(self._observations[-1][0])
+        return None
+
+    def _relocate(self, source: Place) -> None:
+        goals, attempt = self.app.goals, 1 + self._missed
+        ends = goals.position(source), goals.position(self._corner)
+        self.app.goal_client.start(RelocationGoal.KIND_RELOCATE, self.app.now_s, self._held, *ends, attempt=attempt)
         self._missed = 0
         self.go("placing")
-        return None
 
     def _finish(self) -> ApplicationStage.Stage | None:
         image = [(sighting.u_px, sighting.v_px) for _, sighting in self._observations]
@@ -165,6 +190,7 @@ class Calibrating(Stage):
             self._observations = []
             self._start_again(str(error))
             return None
+        homography = replace(homography, plane_frame=self.app.options.frame)
         self.app.outgoing.calibrations.append(homography.to_message(round(self.app.now_s * 1e9)))
         self.app.speak("Now I know where I see what I can reach.")
         return ApplicationStage.STAGE_LEARN

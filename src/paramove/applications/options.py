@@ -43,6 +43,7 @@ class RuleLearnerOptions(ApplicationOptions):
         objects: Names (colours) of the objects.
         corners: Where the robot places an object to learn how the camera sees its working area.
         offer: Where the open hand waits for an object: x, y, and height of the gripper.
+        start: Marked position at which a person stands an object, for a hand that cannot be given one; None: it can.
         surface_x, surface_y: Range of the working surface.
         pointing: How the object pointed at is recognised: by "nearness" of the hand, or by the target of an arm tracked
             in "action_space".
@@ -52,6 +53,7 @@ class RuleLearnerOptions(ApplicationOptions):
     objects: tuple[str, ...] = ("yellow", "green", "blue")
     corners: tuple[Place, ...] = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
     offer: tuple[float, float, float] = (0.155, -0.02, -0.05)
+    start: Place | None = None
     surface_x: Range = (0.100, 0.240)
     surface_y: Range = (-0.170, 0.130)
     pointing: Pointing = "nearness"

@@ -11,6 +11,9 @@ import contextlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from paramove.workspace import Workspace
 
@@ -34,6 +37,16 @@ def overlays(incomplete: str) -> list[str]:
 def robots(incomplete: str) -> list[str]:
     """Names of the robots that are described."""
     return _beginning(incomplete, Workspace.here().robots())
+
+
+RobotOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ROBOT",
+        help="folder of the robot, or its name in robot_description/, for every node that names one",
+        autocompletion=robots,
+    ),
+]
 
 
 def schemas(incomplete: str) -> list[str]:

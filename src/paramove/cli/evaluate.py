@@ -50,6 +50,7 @@ def rule_learning(
     runs: RunsOption = None,
     settings: SetOption = None,
     overlays: WithOption = None,
+    robot: completions.RobotOption = None,
     again: AgainOption = False,
     video: Annotated[bool, typer.Option("--video", help="with video and report of every run; slower")] = False,
     drop_recordings: Annotated[
@@ -62,7 +63,7 @@ def rule_learning(
     succeeded; 3 fewer did; 130 interrupted.
     """
     console = Console(highlight=False, emoji=False)
-    results = _batch(console, seeds, jobs, runs, settings or [], overlays or [], again, video, drop_recordings)
+    results = _batch(console, seeds, jobs, runs, settings or [], overlays or [], robot, again, video, drop_recordings)
     from paramove.runs import LEGEND, TABLE_WIDTH, enough, table_of, totals_of
 
     wide = Console(highlight=False, emoji=False, width=max(console.width, TABLE_WIDTH))
@@ -100,7 +101,7 @@ def homography(
     if run_folder is not None:
         folders = [run_folder]
     else:
-        results = _batch(console, str(seeds), jobs, runs, settings or [], [], False, False, False)
+        results = _batch(console, str(seeds), jobs, runs, settings or [], [], None, False, False, False)
         folders = [Path(result["run_folder"]) for result in results]
     rows: list[dict[str, Any]] = []
     for folder in folders:
@@ -144,6 +145,7 @@ def _batch(
     runs: Path | None,
     settings: list[str],
     overlays: list[str],
+    robot: str | None,
     again: bool,
     video: bool,
     drop_recordings: bool,
@@ -153,12 +155,12 @@ def _batch(
 
     requested, workspace = seeds_in(seeds), Workspace.here()
     # Reports errors before the first run.
-    check(load(workspace, "rule_learning", overlays or None, settings), workspace)
+    check(load(workspace, "rule_learning", overlays or None, settings, robot=robot), workspace)
     folder = (runs or workspace.root / RUNS).resolve()
     options = BatchOptions(
-        workspace.root, folder, jobs, video, video, not drop_recordings, tuple(settings), tuple(overlays)
+        workspace.root, folder, jobs, video, video, not drop_recordings, tuple(settings), tuple(overlays), robot
     )
-    results = {} if again else finished(folder, requested, settings, overlays)
+    results = {} if again else finished(folder, requested, settings, overlays, robot)
     if results:
         console.print(f"results of {len(results)} seeds are taken from {folder} (--again repeats them)", soft_wrap=True)
     missing = [seed for seed in requested if seed not in results]

@@ -51,14 +51,7 @@ def launch(
         ),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="seed of the world", min=0)] = None,
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ROBOT",
-            help="folder of the robot, or its name in robot_description/, for every node that names one",
-            autocompletion=completions.robots,
-        ),
-    ] = None,
+    robot: completions.RobotOption = None,
     headless: Annotated[bool, typer.Option("--headless", help="lines instead of the live table, and no video")] = False,
     page: Annotated[
         bool, typer.Option("--view", help="show the run on a page in the browser, on this machine, with a stop button")

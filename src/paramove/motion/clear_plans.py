@@ -113,7 +113,9 @@ class ClearPlans:
         """Whether the movement was trained around this position."""
         return self.planner.movement.within_training(position)
 
-    def fetch(self, source: Floats, standing: Floats, start: RestPose | None = None) -> PlannedMotion:
+    def fetch(
+        self, source: Floats, standing: Floats, start: RestPose | None = None, target: Floats | None = None
+    ) -> PlannedMotion:
         """Reach from before the object as in 5.2.5; if that is not clear, lower the open hand over it."""
         _check_at_base(start)
         heights = (self.planner.options.entry_height, _HIGHER_ENTRY)

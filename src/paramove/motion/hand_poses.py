@@ -55,12 +55,12 @@ class HandPoses:
             obstacles.append(obstacle)
         raise self._out_of_reach(goal, preferred, band, obstacles)
 
-    def middle(self, height: float, band: tuple[float, float]) -> Floats:
-        """Mean of the positions straight ahead at this height that are reached with a pitch of a band, [3], m."""
+    def ahead(self, height: float, band: tuple[float, float]) -> Floats:
+        """The positions of a row straight ahead at this height that are reached with a pitch of a band, [N, 3], m."""
         ahead = np.arange(0.02, 0.5, _GRID_M)
         positions = np.stack([ahead, np.zeros_like(ahead), np.full_like(ahead, height)], axis=1)
         solutions = self._chain.kinematics.all_joint_angles(positions[:, None], np.linspace(*band, 13)[None])
-        return np.asarray(positions[np.isfinite(solutions).all(axis=-1).any(axis=-1).any(axis=-1)].mean(axis=0))
+        return np.asarray(positions[np.isfinite(solutions).all(axis=-1).any(axis=-1).any(axis=-1)])
 
     def _poses(self, goal: Floats, preferred: float, band: tuple[float, float]) -> tuple[Floats, Floats]:
         """Pitches in order of their distance from the preferred one, with the joint angles, [P] and [P, J]."""

@@ -47,8 +47,10 @@ class MotionPlans(Protocol):
     def closed_opening(self) -> float:
         """ξ of the gripper that closes on an object, which stops it earlier."""
 
-    def fetch(self, source: Floats, standing: Floats, start: RestPose | None = None) -> PlannedMotion:
-        """Grasp the object at `source` and lift it."""
+    def fetch(
+        self, source: Floats, standing: Floats, start: RestPose | None = None, target: Floats | None = None
+    ) -> PlannedMotion:
+        """Grasp the object at `source` and lift it, as suits the `target` of its delivery if that is known."""
 
     def deliver(self, start: RestPose, target: Floats, standing: Floats) -> PlannedMotion:
         """Carry the held object to `target`, release it, go back to the base pose."""

@@ -7,6 +7,7 @@ lowers it, the hand closes and lifts the object, a learned movement carries it o
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -37,6 +38,10 @@ _TABLE_M = 1.0  # to each side of the base
 _UP = np.array([0.0, 0.0, 1.0])
 
 
+USUAL_REACH = 0.8
+"""Quantile of the reachable distances: an object whose target is not known yet is grasped as for one so far away."""
+FINGER_GAP_M = 0.0045
+"""Between an object to be grasped and the face of a finger that does not move: positions of objects are estimates."""
 NOTHING = np.empty((0, 2))
 """No standing objects."""
 
@@ -82,11 +87,14 @@ class ServoArmReaching:
         self.start_tolerance = float(np.deg2rad(description.stream.start_tolerance_deg))
         self._period = description.stream.period_us * 1e-6
         table = WorkSurface((-_TABLE_M, _TABLE_M), (-_TABLE_M, _TABLE_M), o.table_z)
-        self._clearance = ClearanceChecker(description, self.arm, table, cylinder or UprightCylinder())
+        cylinder = cylinder or UprightCylinder()
+        self._clearance = ClearanceChecker(description, self.arm, table, cylinder)
         self._poses = HandPoses(chain, self._clearance, self.arm.angle_of(o.work_opening))
         length = float(np.hypot(*self._arm.upper_arm) + np.hypot(*self._arm.forearm) + self._arm.hand[0])
-        middle = self._poses.middle(o.table_z, self._band(o.grasp_band_deg))
-        self._person = PlacedPerson(robot_movement(model, length), middle, self._arm.yaw_axis, POINTS)
+        ahead = self._poses.ahead(o.table_z, self._band(o.grasp_band_deg))
+        self._usual_reach = float(np.quantile(ahead[:, 0], USUAL_REACH) - self._arm.yaw_axis[0])
+        self._person = PlacedPerson(robot_movement(model, length), ahead.mean(axis=0), self._arm.yaw_axis, POINTS)
+        self._fixed_finger, self._radius = chain.fixed_finger, min(cylinder.radius, 0.5 * chain.object_width[1])
 
     def reach(self, position: ArrayLike, standing: Floats = NOTHING, start: RestPose | None = None) -> PlannedMotion:
         """Bring the end effector to a position with an open gripper, by the learned movement.
@@ -107,11 +115,22 @@ class ServoArmReaching:
         self._go(motion, "reach", goal, pitch, path, self.options.work_opening, self.options.clearance)
         return self._finished(motion)
 
-    def fetch(self, source: ArrayLike, standing: Floats = NOTHING, start: RestPose | None = None) -> PlannedMotion:
-        """Grasp the object at `source` and lift it. Arguments and errors as for `reach`."""
-        point = np.asarray(source, dtype=np.float64)
-        pitch = self._grasp_pitch(point)
+    def fetch(
+        self,
+        source: ArrayLike,
+        standing: Floats = NOTHING,
+        start: RestPose | None = None,
+        target: ArrayLike | None = None,
+    ) -> PlannedMotion:
+        """Grasp the object at `source` and lift it. Arguments and errors as for `reach`.
+
+        Args:
+            target: Where it will be delivered, [3], m: with the same pitch if possible, so that it stands upright.
+        """
+        point = self._beside(source, FINGER_GAP_M)
+        pitch = self._pitch_of_both(point, None if target is None else self._beside(target))
         motion = self._begun(start, standing)
+        motion.held_pitch = pitch
         self._over(motion, "approach", point, pitch, self.options.work_opening)
         self._line(motion, "lower", point, pitch)
         self._fingers(motion, "grasp", self.options.closed_opening)
@@ -120,8 +139,8 @@ class ServoArmReaching:
 
     def deliver(self, start: RestPose, target: ArrayLike, standing: Floats = NOTHING) -> PlannedMotion:
         """Carry the held object to `target`, release it, go back to the base pose. Errors as for `reach`."""
-        point = np.asarray(target, dtype=np.float64)
-        pitch = self._grasp_pitch(point)
+        point = self._beside(target)
+        pitch = self._grasp_pitch(point, start.held_pitch)
         motion = self._begun(start, standing)
         self._over(motion, "carry", point, pitch, self.options.closed_opening, holding=True)
         self._put(motion, point, pitch)
@@ -132,6 +151,7 @@ class ServoArmReaching:
         point, o = np.asarray(position, dtype=np.float64), self.options
         pitch = self._poses.pitch_at(point, np.deg2rad(o.pitch_deg), self._band(o.reach_band_deg))
         motion = self._begun(start, standing)
+        motion.held_pitch = start.held_pitch
         path = self._learned(self._person.approach, point)
         self._go(motion, "carry", point, pitch, path, o.closed_opening, o.clearance, holding=True)
         return self._finished(motion)
@@ -157,7 +177,7 @@ class ServoArmReaching:
         hand = self.arm.position(motion.end)
         if holding:
             below = np.array([*hand[:2], min(hand[2], self.options.table_z + self.options.grasp_height)])
-            self._put(motion, below, self._grasp_pitch(below))
+            self._put(motion, below, self._grasp_pitch(below, here.held_pitch))
         else:
             self._home(motion, "retreat", hand)
         return self._finished(motion)
@@ -338,7 +358,8 @@ class ServoArmReaching:
         rows = np.concatenate(motion.rows)
         phases = tuple((name, self._period * first) for name, first in motion.phases)
         times: Floats = self._period * np.arange(len(rows), dtype=np.float64)
-        return PlannedMotion(times, rows, self.arm.position(rows), np.concatenate(motion.holding), phases, 0.0)
+        hand, holding = self.arm.position(rows), np.concatenate(motion.holding)
+        return PlannedMotion(times, rows, hand, holding, phases, 0.0, motion.held_pitch)
 
     def _learned(self, path: Callable[[Floats], LearnedPath], target: Floats) -> LearnedPath:
         try:
@@ -346,8 +367,31 @@ class ServoArmReaching:
         except (UnreachablePoseError, np.linalg.LinAlgError) as error:
             raise OutOfReachError(f"the learned movement does not lead to {metres(target)}: {error}") from error
 
-    def _grasp_pitch(self, point: Floats) -> float:
-        return self._poses.pitch_at(point, np.deg2rad(self.options.pitch_deg), self._band(self.options.grasp_band_deg))
+    def _grasp_pitch(self, point: Floats, preferred: float | None = None) -> float:
+        """The pitch nearest to the preferred one, or else to that of the options, with which it grasps there."""
+        wanted = np.deg2rad(self.options.pitch_deg) if preferred is None else preferred
+        return self._poses.pitch_at(point, wanted, self._band(self.options.grasp_band_deg))
+
+    def _pitch_of_both(self, source: Floats, target: Floats | None) -> float:
+        """The pitch to grasp with at `source`, if possible one that reaches `target`, or most positions, too."""
+        preferred = self._grasp_pitch(source)
+        if target is not None:
+            return self._grasp_pitch(source, self._grasp_pitch(target, preferred))
+        axis = np.array([*self._arm.yaw_axis, source[2]])
+        ahead = (source - axis) / np.linalg.norm(source - axis)
+        with contextlib.suppress(OutOfReachError):
+            preferred = self._grasp_pitch(axis + self._usual_reach * ahead, preferred)
+        return self._grasp_pitch(source, preferred)
+
+    def _beside(self, position: ArrayLike, gap: float = 0.0) -> Floats:
+        """The end effector when an object at `position` is so far from the face of a finger that does not move."""
+        point = np.asarray(position, dtype=np.float64)
+        if self._fixed_finger is None or point.shape != (3,):
+            return point
+        aside = self._fixed_finger - np.copysign(self._radius + gap, self._fixed_finger)
+        ahead = point[:2] - self._arm.yaw_axis
+        left = np.array([-ahead[1], ahead[0], 0.0]) / max(float(np.linalg.norm(ahead)), 1e-9)
+        return np.asarray(point - aside * left)
 
     def _above(self, point: Floats, pitch: float) -> tuple[Floats, float]:
         above = point + self.options.lift * _UP
@@ -394,6 +438,7 @@ class MotionRows:
     phases: list[tuple[str, int]] = field(default_factory=list)
     standing: Floats = field(default_factory=lambda: NOTHING)
     in_the_way: set[int] = field(default_factory=set)
+    held_pitch: float | None = None
 
     @property
     def end(self) -> Floats:

@@ -76,6 +76,7 @@ class Speech(_message.Message):
         REQUEST_HELP: _ClassVar[Speech.Request]
         REQUEST_THANK_YOU: _ClassVar[Speech.Request]
         REQUEST_POINT_AT_PLACE: _ClassVar[Speech.Request]
+        REQUEST_STAND_OBJECT_AT_START: _ClassVar[Speech.Request]
     REQUEST_UNSPECIFIED: Speech.Request
     REQUEST_HAND_ME_AN_OBJECT: Speech.Request
     REQUEST_LET_GO: Speech.Request
@@ -85,6 +86,7 @@ class Speech(_message.Message):
     REQUEST_HELP: Speech.Request
     REQUEST_THANK_YOU: Speech.Request
     REQUEST_POINT_AT_PLACE: Speech.Request
+    REQUEST_STAND_OBJECT_AT_START: Speech.Request
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     REQUEST_FIELD_NUMBER: _ClassVar[int]
     OBJECT_FIELD_NUMBER: _ClassVar[int]

@@ -97,6 +97,7 @@ class Chain:
         felt_opening, holding_openings: How a held object is detected: see `FingersPart`.
         object_width: Of the smallest and the largest object that the gripper can hold and feel, m.
         grip_current_ma: With which it holds one; None: its servo has no such mode.
+        fixed_finger: y of the face of a finger that does not move, from the end effector, m; None: both move.
         kinematics: Within the robot's soft limits; in the frame of the base site.
     """
 
@@ -110,6 +111,7 @@ class Chain:
     holding_openings: tuple[float, float]
     object_width: tuple[float, float]
     grip_current_ma: float | None
+    fixed_finger: float | None
     sites: ChainSites
     kinematics: PlanarArm
 
@@ -321,6 +323,7 @@ def _chain(names: tuple[str, ...], chain: ChainPart, lower: Floats, upper: Float
         holding_openings=chain.gripper.holding_openings,
         object_width=chain.gripper.object_width_m,
         grip_current_ma=chain.gripper.grip_current_ma,
+        fixed_finger=chain.gripper.fixed_finger_m,
         sites=chain.sites,
         kinematics=PlanarArm(
             names=chain.joints,

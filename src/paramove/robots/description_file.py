@@ -98,11 +98,13 @@ class FingersPart(_Part):
 
 class GripperPart(FingersPart):
     """`object_width_m`: smallest and largest object that it can hold and feel, between the opened fingers as it comes
-    down. `grip_current_ma`: with which it holds one; None for a servo without such a mode.
+    down. `grip_current_ma`: with which it holds one; None for a servo without such a mode. `fixed_finger_m`: y, in the
+    hand, of the inner face of a finger that does not move, from the end effector; None: both fingers move.
     """
 
     object_width_m: tuple[float, float] = (0.015, 0.025)
     grip_current_ma: float | None = Field(default=None, gt=0)
+    fixed_finger_m: float | None = None
 
 
 class ArmSites(_Part):

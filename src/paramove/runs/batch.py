@@ -38,6 +38,7 @@ class BatchOptions:
         keep_recordings: Whether the recordings are kept; a run takes about 0.5 GB.
         settings: `node.parameter=value`, as `paramove launch --set`.
         overlays: As `paramove launch --with`; none: the launch file's own.
+        robot: As `paramove launch --robot`.
     """
 
     workspace: Path
@@ -48,6 +49,7 @@ class BatchOptions:
     keep_recordings: bool = True
     settings: tuple[str, ...] = ()
     overlays: tuple[str, ...] = ()
+    robot: str | None = None
 
 
 def seeds_of(text: str) -> list[int]:
@@ -67,15 +69,20 @@ def result_file(folder: Path, seed: int) -> Path:
 
 
 def finished(
-    folder: Path, seeds: Iterable[int], settings: Sequence[str] = (), overlays: Sequence[str] = ()
+    folder: Path,
+    seeds: Iterable[int],
+    settings: Sequence[str] = (),
+    overlays: Sequence[str] = (),
+    robot: str | None = None,
 ) -> dict[int, dict[str, Any]]:
-    """Results that are there already and were made with the same settings and overlays."""
+    """Results that are there already and were made with the same settings, overlays and robot."""
+    wanted = (list(settings), list(overlays), robot)
     results = {}
     for seed in seeds:
         path = result_file(folder, seed)
         if path.is_file():
             result = json.loads(path.read_text(encoding="utf-8"))
-            if result.get("settings", []) == list(settings) and result.get("overlays", []) == list(overlays):
+            if (result.get("settings", []), result.get("overlays", []), result.get("robot")) == wanted:
                 results[seed] = result
     return results
 
@@ -113,6 +120,7 @@ def run_seed(seed: int, options: BatchOptions, children: Children) -> dict[str, 
     launch = [sys.executable, "-m", "paramove.cli.main", "launch", APPLICATION, f"--seed={seed}", f"--runs={runs}"]
     launch += [f"--set={setting}" for setting in options.settings]
     launch += [f"--with={overlay}" for overlay in options.overlays]
+    launch += [] if options.robot is None else [f"--robot={options.robot}"]
     launch += [] if options.video else ["--headless"]
     launched = children.call(launch, options.workspace, environment, options.folder / f"seed_{seed:04d}.log")
     folder = (runs / "latest").resolve()
@@ -120,6 +128,7 @@ def run_seed(seed: int, options: BatchOptions, children: Children) -> dict[str, 
         "seed": seed,
         "settings": list(options.settings),
         "overlays": list(options.overlays),
+        "robot": options.robot,
         "exit_code": launched,
         "run_folder": str(folder),
     }
