@@ -23,7 +23,7 @@ class Config(NodeConfig, RuleLearnerOptions):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until all objects are put away, the arm is not armed any more, or the bus closes."""
-    learner = RuleLearner(config, f"goal-{bus.now_ns}")
+    learner = RuleLearner(config, f"goal-{bus.now_ns}", bus.settings.begun_ns)
     handle = (learner.on_gesture, learner.on_goal_status, learner.on_safety)
     bus.ready("waiting for the arm")
     for event in bus.events(*SUBSCRIBES, tick=True):

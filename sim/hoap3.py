@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Callable, Iterator
 from typing import Any, BinaryIO
 
@@ -51,8 +52,9 @@ class Hoap3:
         """What the robot reports."""
         yield topics.WIRE_HOAP3_STATE, self.state(world.joint_positions(), now_ns)
 
-    def connect(self, world: World, step: Callable[[], None]) -> None:
+    def connect(self, world: World, step: Callable[[], None]) -> threading.Lock | None:
         """It moves by torques."""
+        return None
 
     def close(self) -> None:
         """Nothing is open."""

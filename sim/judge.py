@@ -53,7 +53,7 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then write the verdict."""
     cv2.setNumThreads(1)
     path = bus.run_folder / "truth.mcap"
-    judge = Judge(bus.run_folder / "truth.json") if config.verdict is not None else None
+    judge = Judge(bus.run_folder / "truth.json", bus.settings.begun_ns) if config.verdict is not None else None
     earlier = judge.recall(PartedRecording(path)) if judge is not None else 0
     detail = f"goes on after {earlier} recorded states" if earlier else "records the truth"
     with contextlib.ExitStack() as ending:
@@ -72,8 +72,8 @@ def run(bus: Bus, config: Config) -> None:
 class Judge:
     """A verdict and its file."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, path: Path, run_begun_ns: int = 0) -> None:
+        self._path, self._run_begun_ns = path, run_begun_ns
         self._verdict: Verdict | None = None
         self._begun_s = 0.0
 
@@ -105,7 +105,7 @@ class Judge:
     def begin(self, layout: Any) -> None:
         """The run's layout is known. It is published once, and again after a restart."""
         if self._verdict is None:
-            self._verdict = Verdict(layout)
+            self._verdict = Verdict(layout, self._run_begun_ns)
 
     def take(self, state: Any) -> str:
         """Take in a state; now and then write the verdict and return it as a message, else ""."""

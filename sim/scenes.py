@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from sim.simulator import Config
 
 
-def build(options: Config, run_folder: Path, bus_folder: Path, firmware_log: BinaryIO | None = None) -> Simulated:
+def build(
+    options: Config, run_folder: Path, bus_folder: Path, firmware_log: BinaryIO | None = None, lockstep: bool = True
+) -> Simulated:
     """The scene that the options name.
 
     Args:
@@ -34,17 +36,22 @@ def build(options: Config, run_folder: Path, bus_folder: Path, firmware_log: Bin
         run_folder: That the name of a port starts from.
         bus_folder: Of the socket by which a servo arm's driver paces the world.
         firmware_log: Gets every frame that the robot's firmware plays, 28 little-endian int16 a millisecond.
+        lockstep: Whether the run is in lockstep.
     """
     if options.scene == "servo_arm":
         robot = RobotDescription.load(options.robot)
         return ServoArmWorld(robot, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed)
     if options.scene == "pointing":
         return PointingWorld(options.seed, options.targets, options.views, options.markers)
-    return at_the_tool_box(options, run_folder, bus_folder, firmware_log)
+    return at_the_tool_box(options, run_folder, bus_folder, firmware_log, lockstep)
 
 
 def at_the_tool_box(
-    options: Config, run_folder: Path = Path(), bus_folder: Path = Path(), firmware_log: BinaryIO | None = None
+    options: Config,
+    run_folder: Path = Path(),
+    bus_folder: Path = Path(),
+    firmware_log: BinaryIO | None = None,
+    lockstep: bool = True,
 ) -> Simulation:
     """A scene of a robot at the tool box."""
     draws, world_looks = looks.streams(options.seed), Looks.draw(options.seed, options.measures)
@@ -53,7 +60,7 @@ def at_the_tool_box(
     if description.chain is None:
         robot = Hoap3(description, firmware_log)
     else:
-        robot = ServoArm(description, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed)
+        robot = ServoArm(description, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed, lockstep)
     tracked = None if options.scene == "rule_learning" else TrackedPerson(options.seed)
     world = World(world_looks, description, None if tracked is None else tracked.furnish)
     cameras: list[ImageSource] = [ViewForPeople(world.model)] if options.video else []

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -69,8 +71,8 @@ class Simulated(Protocol):
 class SimulatedRobot(Protocol):
     """What moves a robot's motors in a world."""
 
-    def connect(self, world: World, step: Callable[[], None]) -> None:
-        """Begins to move in a world that advances by `step`."""
+    def connect(self, world: World, step: Callable[[], None]) -> threading.Lock | None:
+        """Begins to move in a world that advances by `step`; if by itself, in real time, under the lock returned."""
 
     def handle(self, received: Received) -> None:
         """Handles a message of the bus."""
@@ -121,12 +123,14 @@ class Simulation:
         self.world_from_table = world_from_table
         self.write_measures = write_measures
         self.physics_s = self.rendering_s = 0.0
-        robot.connect(world, self._step)
+        lock = robot.connect(world, self._step)
+        self._in_real_time, self._lock = lock is not None, lock or contextlib.nullcontext()
+        self._copy = mujoco.MjData(world.model)
 
     @property
     def now_ns(self) -> int:
-        """Simulated time since the start."""
-        return self.world.steps * 1_000_000
+        """Simulated time since the start, or monotonic time of a world that runs by itself."""
+        return time.monotonic_ns() if self._in_real_time else self.world.steps * 1_000_000
 
     @property
     def tick(self) -> int:
@@ -139,9 +143,10 @@ class Simulation:
 
     def handle(self, received: Received) -> None:
         """Handle a message of the stream or of the robot's speech."""
-        self.robot.handle(received)
-        if received.topic is topics.SPEECH:
-            self.person.handle(received.message.request, received.message.object)
+        with self._lock:
+            self.robot.handle(received)
+            if received.topic is topics.SPEECH:
+                self.person.handle(received.message.request, received.message.object)
 
     def run_to_tick(self, tick: int) -> None:
         """Let the world run up to a tick; raises SimulationError."""
@@ -156,15 +161,24 @@ class Simulation:
     def messages(self) -> Iterator[tuple[Topic, Any]]:
         """Everything that the world shows now. A state that is not finite never gets here: the step raises."""
         started = time.perf_counter()
-        if self.person.arm is not None:
-            self._show_arm(self.person.arm.posture)
-        images = [image for camera in self._cameras for image in camera.images(self.world.data, self.tick, self.now_ns)]
+        world, person, data = self.world, self.person, self.world.data
+        with self._lock:
+            now_ns, tick = self.now_ns, self.tick
+            if person.arm is not None:
+                self._show_arm(person.arm.posture)
+            others = [
+                *self.robot.messages(world, now_ns),
+                (topics.TRUTH_STATE, truth.state(now_ns, world, self.robot, person)),
+            ]
+            if person.arm is not None:
+                others.append((topics.TRUTH_ARM, truth.arm(now_ns, person.arm)))
+            if self._in_real_time:
+                mujoco.mj_copyData(self._copy, world.model, data)
+                data = self._copy
+        images = [image for camera in self._cameras for image in camera.images(data, tick, now_ns)]
         self.rendering_s += time.perf_counter() - started
         yield from images
-        yield from self.robot.messages(self.world, self.now_ns)
-        yield topics.TRUTH_STATE, truth.state(self.now_ns, self.world, self.robot, self.person)
-        if self.person.arm is not None:
-            yield topics.TRUTH_ARM, truth.arm(self.now_ns, self.person.arm)
+        yield from others
 
     def shown(self) -> dict[Topic, Any]:
         """The same by topic."""

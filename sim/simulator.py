@@ -123,7 +123,7 @@ def run(bus: Bus, config: Config) -> None:
         log = None
         if config.firmware_log:  # without a buffer: nothing is lost when the process is killed
             log = open_files.enter_context((bus.run_folder / FIRMWARE_LOG).open("xb", buffering=0))
-        simulation = build(config, bus.run_folder, bus.settings.folder, log)
+        simulation = build(config, bus.run_folder, bus.settings.folder, log, bus.settings.lockstep)
         open_files.callback(simulation.close)
         simulation.write_measures(bus.run_folder)
         _loop(bus, config, simulation)
@@ -140,7 +140,8 @@ def _loop(bus: Bus, config: Config, simulation: Simulated) -> None:
     if not bus.settings.lockstep:
         bus.idle(CONNECTION_S)
     started_s = due_s = time.perf_counter()
-    while not bus.stopped and not simulation.finished and simulation.now_ns < 1e9 * config.max_duration_s:
+    end_ns = simulation.now_ns + round(1e9 * config.max_duration_s)
+    while not bus.stopped and not simulation.finished and simulation.now_ns < end_ns:
         for topic, message in simulation.messages():
             bus.publish(topic, message, simulation.now_ns)
         for received in barrier.advance(simulation.now_ns):

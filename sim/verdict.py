@@ -21,10 +21,11 @@ class Verdict:
 
     Args:
         layout: Openings and rules.
+        begun_ns: When the run began, by its clock.
     """
 
-    def __init__(self, layout: TruthLayout) -> None:
-        self._layout = layout
+    def __init__(self, layout: TruthLayout, begun_ns: int = 0) -> None:
+        self._layout, self._begun_ns = layout, begun_ns
         self._openings = {item.name: item for item in layout.openings}
         self._rules = {rule.object: rule.opening for rule in layout.rules}
         self._recent: deque[TruthState] = deque(maxlen=REST_STATES)
@@ -79,7 +80,7 @@ class Verdict:
             "deepest_penetration_mm": round(last.deepest_penetration_mm, 4),
             "gripper_error_mm": _spread(self._errors_mm),
             "gripper_error_at_rest_mm": _spread(self._errors_at_rest_mm),
-            "simulated_s": round(1e-9 * last.time_ns, 3),
+            "simulated_s": round(1e-9 * (last.time_ns - self._begun_ns), 3),
             "states": self.states,
             "layout": {
                 "openings": [

@@ -75,7 +75,7 @@ class Learning(Stage):
 
     def _description(self, name: str) -> str:
         place, (seen_s, _) = self.app.rules[name], self._observations[name]
-        return f"{name} belongs to the opening at {cm(place)}, seen going in at {seen_s:.1f} s"
+        return f"{name} belongs to the opening at {cm(place)}, seen going in at {seen_s - self.app.begun_s:.1f} s"
 
     def _publish_rules(self) -> None:
         message = Rules(frame=self.app.options.frame)

@@ -23,11 +23,12 @@ class RuleLearner:
     Args:
         options: Positions and timeouts.
         run_name: Prefix of the goals' ids; unique to the process, as a goal id is executed only once.
+        begun_ns: When the run began, by its clock; for texts.
     """
 
-    def __init__(self, options: RuleLearnerOptions, run_name: str) -> None:
+    def __init__(self, options: RuleLearnerOptions, run_name: str, begun_ns: int = 0) -> None:
         goals = Goals(options.frame, options.grasp_z)
-        self._app = ApplicationState(options, GoalClient(goals, run_name), goals)
+        self._app = ApplicationState(options, GoalClient(goals, run_name), goals, 1e-9 * begun_ns)
         self._watch = ArmWatch(options.arming_timeout_s)
         self._stage: Stage | None = None
         self._finished = False

@@ -23,6 +23,7 @@ class ApplicationState:
     """State that all stages use.
 
     Attributes:
+        begun_s: When the run began, by the same clock as all times.
         rules: Object -> position of its opening.
         done: Objects that have been put away.
     """
@@ -30,6 +31,7 @@ class ApplicationState:
     options: RuleLearnerOptions
     goal_client: GoalClient
     goals: Goals
+    begun_s: float = 0.0
     table: Table = field(default_factory=Table)
     outgoing: OutgoingMessages = field(default_factory=OutgoingMessages)
     now_s: float = 0.0
@@ -43,7 +45,7 @@ class ApplicationState:
         speech.captured.FromNanoseconds(round(self.now_s * 1e9))
         self.outgoing.speech.append(speech)
         self.detail = detail
-        _log.info("%.1f s: %s", self.now_s, detail)
+        _log.info("%.1f s: %s", self.now_s - self.begun_s, detail)
 
 
 class Stage(ABC):

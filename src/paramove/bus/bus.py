@@ -271,7 +271,7 @@ class Bus:
 
     def _source_of_time(self, publishes_clock: bool) -> TickSource:
         if publishes_clock:
-            return ExternalClock()
+            return ExternalClock(self.settings.begun_ns)
         if self.settings.clock == "monotonic":
             return RealTimeTicks(self.exchange)
         return LockstepTicks(self.exchange, self.node) if self.settings.lockstep else SimulatedTicks(self.exchange)

@@ -118,10 +118,10 @@ class SimulatedTicks:
 
 
 class ExternalClock:
-    """The time of the process that publishes the clock: it makes the iterations of the others."""
+    """The time of the process that publishes the clock, from when the run began: it makes the others' iterations."""
 
-    def __init__(self) -> None:
-        self.now_ns = 0
+    def __init__(self, begun_ns: int) -> None:
+        self.now_ns = begun_ns
         self.may_publish = True
 
     def next(self, names: list[str]) -> LoopTick | None:

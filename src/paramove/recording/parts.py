@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from paramove.recording.reader import Recorded, read
@@ -41,13 +41,15 @@ class PartedRecording:
 
     Args:
         path: Of the first part.
+        begun_ns: When the run began, by its clock: subtracted from the times of messages and gaps.
 
     Attributes:
         parts: The files that there are, in order; unfinished ones end with their last whole chunk.
         gaps: Between parts, as far as they were read last.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, begun_ns: int = 0) -> None:
+        self._begun_ns = begun_ns
         self.parts: list[Path] = []
         self.gaps: list[Gap] = []
         for number in itertools.count(1):
@@ -66,7 +68,7 @@ class PartedRecording:
         latest: dict[str, tuple[int, int]] = {}
         for part in self.parts:
             before, first = dict(latest), True
-            for recorded in read(part, only):
+            for recorded in map(self._since_begin, read(part, only)):
                 stamp = (recorded.publish_ns, recorded.sequence)
                 if stamp <= before.get(recorded.topic, (-1, -1)):
                     continue
@@ -75,6 +77,12 @@ class PartedRecording:
                 first = False
                 latest[recorded.topic] = max(stamp, latest.get(recorded.topic, stamp))
                 yield recorded
+
+    def _since_begin(self, recorded: Recorded) -> Recorded:
+        if not self._begun_ns:
+            return recorded
+        log_ns, publish_ns = recorded.log_ns - self._begun_ns, recorded.publish_ns - self._begun_ns
+        return replace(recorded, log_ns=log_ns, publish_ns=publish_ns)
 
 
 def _unfinished(part: Path) -> Path:

@@ -112,6 +112,7 @@ class RecordedRun:
         facts: Of `run.yaml`.
         end_s: When the application was done, else when the recording ended.
         done: Whether the application reported that it was done.
+        begun_ns: When it began, by its clock; all other times count from there.
         gaps: Times at which nothing was recorded: the recorder or the judge was being started again, or the disk full.
     """
 
@@ -123,7 +124,12 @@ class RecordedRun:
     facts: dict[str, Any] = field(default_factory=dict)
     end_s: float = 0.0
     done: bool = False
+    begun_ns: int = 0
     gaps: tuple[RecordingGap, ...] = ()
+
+    def captured_s(self, message: Any) -> float:
+        """Capture time of a message."""
+        return float(1e-9 * (message.captured.ToNanoseconds() - self.begun_ns))
 
     def received(self, topic: topics.Topic) -> list[Recorded]:
         """Messages of a topic, in order."""
@@ -136,7 +142,9 @@ def load_run(folder: Path) -> RecordedRun:
     Raises:
         RunFolderError: There is no recording or no truth in it, or they are empty.
     """
-    recording, truth_file = recording_in(folder, "recording.mcap"), recording_in(folder, "truth.mcap")
+    facts = read_facts(folder)
+    begun_ns = int(facts.get("begun_ns", 0))
+    recording, truth_file = (recording_in(folder, f"{name}.mcap", begun_ns) for name in ("recording", "truth"))
     recorded, traffic = _read_recording(recording)
     end_ns, done = _end_of(recorded, traffic)
     until_end = {
@@ -144,16 +152,17 @@ def load_run(folder: Path) -> RecordedRun:
         for name, messages in recorded.items()
     }
     traffic.cut(end_ns)
-    truth = _read_truth(truth_file, end_ns)
+    truth = _read_truth(truth_file, begun_ns, end_ns)
     return RecordedRun(
         folder=folder,
         messages=until_end,
         traffic=traffic,
         truth=truth,
         verdict=_read_json(folder / "truth.json"),
-        facts=read_facts(folder),
+        facts=facts,
         end_s=end_ns * 1e-9,
         done=done,
+        begun_ns=begun_ns,
         gaps=_gaps({"recording": recording, "truth": truth_file}, end_ns),
     )
 
@@ -177,9 +186,9 @@ def _gaps(recordings: Mapping[str, PartedRecording], end_ns: float = float("inf"
     )
 
 
-def recording_in(folder: Path, name: str) -> PartedRecording:
+def recording_in(folder: Path, name: str, begun_ns: int = 0) -> PartedRecording:
     """The recording of that name, finished or not, with all its parts; raises RunFolderError."""
-    recording = PartedRecording(folder / name)
+    recording = PartedRecording(folder / name, begun_ns)
     if recording.parts:
         return recording
     content = ", ".join(sorted(path.name for path in folder.iterdir())) if folder.is_dir() else "no such folder"
@@ -209,13 +218,13 @@ def _names(recording: PartedRecording) -> str:
     return ", ".join(map(str, recording.parts))
 
 
-def _read_truth(recording: PartedRecording, end_ns: int) -> Truth:
+def _read_truth(recording: PartedRecording, begun_ns: int, end_ns: int) -> Truth:
     layout: Any = None
     states: list[Any] = []
     for recorded in recording.read({topics.TRUTH_LAYOUT.name, topics.TRUTH_STATE.name}):
         if recorded.topic == topics.TRUTH_LAYOUT.name:
             layout = recorded.message
-        elif recorded.message.time_ns <= end_ns:
+        elif recorded.message.time_ns - begun_ns <= end_ns:
             states.append(recorded.message)
     if layout is None or not states:
         raise RunFolderError(f"{_names(recording)} holds no {'state' if layout is not None else 'layout'} of the world")
@@ -226,7 +235,7 @@ def _read_truth(recording: PartedRecording, end_ns: int) -> Truth:
             objects[body.name].append(body)
     return Truth(
         layout=layout,
-        time_s=np.array([state.time_ns for state in states]) * 1e-9,
+        time_s=np.array([state.time_ns - begun_ns for state in states]) * 1e-9,
         gripper=np.array([state.gripper for state in states]) - shoulder,
         commanded=np.array([state.gripper_commanded for state in states]) - shoulder,
         objects={name: np.array([(b.x, b.y, b.z) for b in bodies]) - shoulder for name, bodies in objects.items()},

@@ -161,7 +161,7 @@ def motions_of(run: RecordedRun) -> list[Motion]:
     for recorded in run.received(topics.ARM_TRAJECTORY_STATUS):
         status = recorded.message
         if status.state == TrajectoryStatus.STATE_EXECUTING and status.time_s > 0:
-            at_s = status.captured.ToNanoseconds() * 1e-9
+            at_s = run.captured_s(status)
             progress.setdefault(status.trajectory_id, []).append((at_s, status.time_s))
         elif status.state == TrajectoryStatus.STATE_SUCCEEDED and status.trajectory_id in progress:
             begun_s = progress[status.trajectory_id][0][0] - progress[status.trajectory_id][0][1]

@@ -52,6 +52,8 @@ def run(
         folder.write_effective(launch)
         folder.write_configs(launch, domain.folder, domain.truth_folder, clock_publisher(interfaces))
         facts = _facts(launch, workspace, domain.name, begun)
+        if launch.file.bus.clock == "monotonic":
+            facts["begun_ns"] = folder.begun_ns
         folder.write_run(facts)
         supervisor = Supervisor(launch, workspace, folder, domain, make_view(folder))
         outcome = supervisor.run()

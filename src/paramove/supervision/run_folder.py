@@ -19,10 +19,11 @@ class RunFolder:
 
     Attributes:
         path: The folder.
+        begun_ns: When the run began, by the monotonic clock.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        self.path, self.begun_ns = path, time.monotonic_ns()
         self.nodes = path / "nodes"
         self.logs = path / "logs"
 
@@ -73,7 +74,7 @@ class RunFolder:
             truth_folder: Of the sockets of the ground truth; only nodes with `truth: true` get it.
             clock: Node that publishes the clock; in lockstep it gets the list of members.
         """
-        lockstep, begun_ns = launch.file.bus.lockstep, time.monotonic_ns()
+        lockstep = launch.file.bus.lockstep
         for name, node in launch.file.nodes.items():
             bus: dict[str, Any] = {
                 "folder": str(bus_folder),
@@ -81,7 +82,7 @@ class RunFolder:
                 "lockstep": lockstep and (node.lockstep or name == clock),
             }
             if launch.file.bus.clock == "monotonic":
-                bus["begun_ns"] = begun_ns
+                bus["begun_ns"] = self.begun_ns
             if name == clock and lockstep:
                 bus["members"] = [other for other, its in launch.file.nodes.items() if its.lockstep and other != clock]
             if node.truth:

@@ -60,7 +60,7 @@ class CommandedGripper:
     def __init__(self, run: RecordedRun, robot: RobotDescription, side: str = "right") -> None:
         arm = robot.arm(side)
         states = [r for r in run.received(topics.WIRE_HOAP3_STATE) if len(r.message.target_counts) == robot.n_joints]
-        self.time_s = np.array([r.message.captured.ToNanoseconds() for r in states]) * 1e-9
+        self.time_s = np.array([run.captured_s(r.message) for r in states])
         counts = np.array([list(r.message.target_counts) for r in states]).reshape(-1, robot.n_joints)
         self.angles = robot.units.to_radians(counts)[:, arm.indices]
         points = arm.kinematics.forward(self.angles)

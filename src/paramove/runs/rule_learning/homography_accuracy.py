@@ -94,7 +94,7 @@ def detected_at_rest(run: RecordedRun) -> list[DetectedAtRest]:
         gesture = recorded.message
         if gesture.kind not in _AT_REST or not gesture.located or gesture.object not in truth.objects:
             continue
-        time_s = gesture.captured.ToNanoseconds() * 1e-9
+        time_s = run.captured_s(gesture)
         state = truth.at(time_s)
         x, y, z = truth.objects[gesture.object][state]
         stands = abs(z - truth.surface_z - HALF_HEIGHT) < STANDING and truth.upright[gesture.object][state] > UPRIGHT

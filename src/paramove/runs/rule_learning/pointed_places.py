@@ -76,11 +76,11 @@ def pointed_places(run: RecordedRun) -> list[PointedPlace]:
     ]
     found = []
     for begin_s, end_s, name in _performances(run.truth):
-        within = [gesture for gesture in gestures if begin_s <= _time_s(gesture) <= end_s]
-        found.append(_place(run.truth, name, begin_s, within[-1] if within else None))
+        within = [gesture for gesture in gestures if begin_s <= run.captured_s(gesture) <= end_s]
+        found.append(_place(run, name, begin_s, within[-1] if within else None))
         gestures = [gesture for gesture in gestures if gesture not in within[-1:]]
-    applied = [gesture for gesture in gestures if _in_apply(run, _time_s(gesture))]
-    return found + [_place(run.truth, "", _time_s(gesture), gesture) for gesture in applied]
+    applied = [gesture for gesture in gestures if _in_apply(run, run.captured_s(gesture))]
+    return found + [_place(run, "", 0.0, gesture) for gesture in applied]
 
 
 def unrequested_fetches(run: RecordedRun, relocations: Sequence[Relocation]) -> list[Relocation]:
@@ -138,9 +138,9 @@ def _performances(truth: Truth) -> list[tuple[float, float, str]]:
     return found
 
 
-def _place(truth: Truth, meant: str, begin_s: float, gesture: Any | None) -> PointedPlace:
-    time_s = begin_s if gesture is None else _time_s(gesture)
-    standing = _standing(truth, time_s)
+def _place(run: RecordedRun, meant: str, begin_s: float, gesture: Any | None) -> PointedPlace:
+    time_s = begin_s if gesture is None else run.captured_s(gesture)
+    standing = _standing(run.truth, time_s)
     true = standing.get(meant)
     believed = None if gesture is None else (float(gesture.x), float(gesture.y))
     near = "" if believed is None else min(standing, key=lambda name: _apart_mm(standing[name], believed), default="")
@@ -162,10 +162,6 @@ def _standing(truth: Truth, time_s: float) -> dict[str, Place]:
 
 def _in_apply(run: RecordedRun, time_s: float) -> bool:
     return any(one["stage"] == "apply" and one["begin_s"] <= time_s <= one["end_s"] for one in stages_of(run))
-
-
-def _time_s(gesture: Any) -> float:
-    return float(gesture.captured.ToNanoseconds() * 1e-9)
 
 
 def _apart_mm(a: Place | None, b: Place | None) -> float:

@@ -12,7 +12,7 @@ from rich.progress import track
 
 from paramove.bus import topics
 from paramove.documents import Image, InputError, decoded, replacing
-from paramove.runs.recorded_run import recording_in
+from paramove.runs.recorded_run import RecordedRun, recording_in
 from paramove.runs.rule_learning.story import Story
 from paramove.runs.rule_learning.summary import RunEvaluation
 from paramove.runs.rule_learning.video_frame import SIZE, VideoFrame
@@ -32,7 +32,7 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
         VideoError: There is no encoder.
     """
     run = evaluation.run
-    number = sum(time_s <= run.end_s for time_s in view_times(run.folder))
+    number = sum(time_s <= run.end_s for time_s in view_times(run))
     if number == 0:
         return None
     story = Story(run, evaluation.relocations)
@@ -42,7 +42,7 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
     path = run.folder / "demo.mp4"
     with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
         indices = range(0, number, every)
-        pictures = paired_images(run.folder, every)
+        pictures = paired_images(run, every)
         picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         for _, (time_s, camera, view) in zip(
             track(indices, "video", console=console, transient=True), pictures, strict=False
@@ -54,17 +54,18 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
     return path
 
 
-def view_times(folder: Path) -> Iterator[float]:
+def view_times(run: RecordedRun) -> Iterator[float]:
     """Times of the recorded views, s."""
-    for recorded in recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name}):
+    for recorded in recording_in(run.folder, "truth.mcap", run.begun_ns).read({topics.TRUTH_VIEW.name}):
         yield recorded.log_ns * 1e-9
 
 
-def paired_images(folder: Path, every: int) -> Iterator[tuple[float, Image, Image]]:
+def paired_images(run: RecordedRun, every: int) -> Iterator[tuple[float, Image, Image]]:
     """Time, camera image and view, RGB, of every so-many-th view; the camera's image is the latest one by then."""
-    cameras = recording_in(folder, "recording.mcap").read({topics.CAMERA_IMAGE.name})
+    cameras = recording_in(run.folder, "recording.mcap", run.begun_ns).read({topics.CAMERA_IMAGE.name})
     latest, following = None, next(cameras, None)
-    for index, view in enumerate(recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name})):
+    views = recording_in(run.folder, "truth.mcap", run.begun_ns).read({topics.TRUTH_VIEW.name})
+    for index, view in enumerate(views):
         while following is not None and following.log_ns <= view.log_ns:
             latest, following = following, next(cameras, None)
         if index % every == 0 and latest is not None:
