@@ -23,7 +23,7 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes or a video file ends. A bad frame is not published and makes the node degraded."""
-    source = open_source(config.source, config.width, config.height)
+    source = open_source(config.source, config.width, config.height, bus.run_folder)
     checks = FrameChecks(config.width, config.height, config.frozen_after)
     bus.ready(f"frames from {config.source}")
     fault = ""

@@ -12,6 +12,7 @@ from sim.camera import ImageSource, RobotCamera, ViewForPeople
 from sim.hoap3 import Hoap3
 from sim.instructor import Instructor
 from sim.looks import Looks
+from sim.offered_camera import OfferedCamera
 from sim.person import Person
 from sim.place_instructor import OBJECT, PlaceInstructor
 from sim.places import START
@@ -54,8 +55,9 @@ def at_the_tool_box(
     lockstep: bool = True,
 ) -> Simulation:
     """A scene of a robot at the tool box."""
-    draws, world_looks = looks.streams(options.seed), Looks.draw(options.seed, options.measures)
     description = RobotDescription.load(options.robot)
+    measures = options.measures or (tool_box.NOMINAL if description.chain is None else tool_box.WIDE)
+    draws, world_looks = looks.streams(options.seed), Looks.draw(options.seed, measures)
     robot: SimulatedRobot
     if description.chain is None:
         robot = Hoap3(description, firmware_log)
@@ -65,7 +67,9 @@ def at_the_tool_box(
     world = World(world_looks, description, None if tracked is None else tracked.furnish)
     cameras: list[ImageSource] = [ViewForPeople(world.model)] if options.video else []
     if options.camera and options.scene != "relocate_by_pointing":
-        cameras.append(RobotCamera(world.model, world_looks, draws["noise"]))
+        camera: ImageSource = RobotCamera(world.model, world_looks, draws["noise"])
+        socket = options.camera_socket
+        cameras.append(camera if socket is None else OfferedCamera(camera, run_folder / socket))
     if tracked is None:
         return Simulation(world_looks, world, robot, Instructor(world, world_looks.rules, draws), cameras)
     if options.camera:

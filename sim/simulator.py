@@ -31,7 +31,7 @@ from paramove.bus import Bus, LockstepBarrier, NodeConfig, main, topics
 from paramove.robots import RobotFolder
 from sim.scenes import build
 from sim.simulation import CAMERA_HZ, Simulated
-from sim.tool_box import NOMINAL, Measures
+from sim.tool_box import Measures
 from sim.world import log_warnings_of_mujoco
 
 SUBSCRIBES = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
@@ -60,6 +60,7 @@ OF_SCENES: Mapping[frozenset[str], frozenset[str]] = {
     frozenset({"targets", "views", "markers"}): frozenset({"pointing"}),
     frozenset({"robot"}): frozenset(get_args(Scene)) - {"pointing"},
     frozenset({"camera", "video", "measures"}): frozenset(get_args(Scene)) - {"pointing", "servo_arm"},
+    frozenset({"camera_socket"}): frozenset({"rule_learning"}),
     frozenset({"port"}): frozenset(get_args(Scene)) - {"pointing"},
     frozenset({"arm_image_every"}): frozenset({"rule_learning_whole_arm", "relocate_by_pointing"}),
 }
@@ -79,13 +80,15 @@ class Config(NodeConfig):
         robot: Folder of the robot's description.
         camera: Whether cameras' images are rendered; without, no graphics library is needed.
         video: Whether a view for people is rendered too.
-        measures: Of the tool box and of the nominal camera.
+        measures: Of the tool box and of the nominal camera; None: those for the robot's objects.
         arm_image_every: Cameras that look at an arm give an image in every so many ticks of 1/15 s; rendering and
             tracking take most of the time of a run.
         targets: Of `pointing`: how often the person points.
         views: Of `pointing`: which cameras look, from 1.
         markers: Of `pointing`: points of the arm at which the person wears coloured balls.
         port: Of a servo arm: link to the serial port, relative to the run's folder.
+        camera_socket: Where the robot's camera offers its images instead of publishing them, relative to the run's
+            folder: as a webcam does behind its device.
         max_duration_s: Simulated time after which the run ends.
         pace: Simulated seconds per second when nobody waits for anybody (not in lockstep).
         firmware_log: Whether every frame that the firmware plays is written to the run folder (56 kB/s), for those who
@@ -97,12 +100,13 @@ class Config(NodeConfig):
     robot: RobotFolder = Path("robot_description/hoap3")
     camera: bool = True
     video: bool = False
-    measures: Measures = NOMINAL
+    measures: Measures | None = None
     arm_image_every: int = Field(default=1, ge=1, le=4)
     targets: int = Field(default=5, ge=1, le=100)
     views: tuple[int, ...] = Field(default=(1, 2), min_length=1, max_length=4)
     markers: tuple[Marker, ...] = ()
     port: Path = Path("by-id/usb-paramove_emulated_servos-if00-port0")
+    camera_socket: Path | None = None
     max_duration_s: float = Field(default=600.0, gt=0)
     pace: float = Field(default=1.0, gt=0)
     firmware_log: bool = False

@@ -64,6 +64,8 @@ class Measures:
 
 
 NOMINAL = Measures()
+WIDE = Measures(opening_radius=0.0185)
+"""For the objects of a servo arm."""
 
 
 @dataclass(frozen=True)

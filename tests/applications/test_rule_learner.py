@@ -507,6 +507,17 @@ def test_an_arm_that_was_never_armed_is_waited_for() -> None:
     story.learner.on_safety(safety(SafetyState.STATE_DISARMED))
     story.run(OPTIONS.arming_timeout_s + 5.0)
     assert story.learner.failure == ""
+    assert story.sentences().count("paramove arm enable") == 1
+    assert kinds(story) == ["REST"], "nothing else is tried"
+    story.learner.on_safety(safety(SafetyState.STATE_ARMED))
+    assert story.run(), story.learner.detail
+
+
+def test_why_an_arm_cannot_be_armed_is_said_with_the_request() -> None:
+    story = Story()
+    story.learner.on_safety(safety(SafetyState.STATE_DISARMED, "joint gripper is not calibrated"))
+    story.run(5.0)
+    assert "not calibrated" in story.sentences()
 
 
 @pytest.mark.parametrize(

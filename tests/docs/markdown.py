@@ -7,6 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 CONNECT_YOUR_ARM = ROOT / "docs" / "tutorials" / "connect_your_arm.md"
+TEACH_RULES = ROOT / "docs" / "tutorials" / "teach_rules_to_your_arm.md"
 
 MARKERS = ("check only", "needs a running demo", "in the example", "on an emulated arm")
 

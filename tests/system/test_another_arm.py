@@ -70,9 +70,11 @@ def test_an_arm_that_is_a_folder_reaches_and_relocates(launcher, tmp_path):
 
 
 @pytest.mark.slow
-def test_it_learns_rules_by_watching(launcher, tmp_path):
-    code, shown = launcher.run("rule_learning", "--headless", "--robot", str(described(tmp_path)), timeout_s=900)
-    assert code == 0, shown
+def test_it_calibrates_itself_to_learn_rules(launcher, tmp_path):
+    """As far as its own corners; the rest is the same for every arm."""
+    ends = ["--headless", "--set", "simulator.max_duration_s=125"]
+    _, shown = launcher.run("rule_learning", "--robot", str(described(tmp_path)), *ends)
+    assert "Now I know where I see what I can reach" in shown
     assert launcher.truth()["unwanted_contacts"] == 0
 
 

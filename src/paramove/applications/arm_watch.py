@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from paramove.msgs.safety_state_pb2 import SafetyState
 
+UNARMED_S = 2.0
+"""A program arms an emulated arm within this time; then a person is needed."""
 _AT_WORK = (SafetyState.STATE_ARMED, SafetyState.STATE_STOPPING)
 
 
@@ -18,6 +20,7 @@ class ArmWatch:
         self._timeout_s = timeout_s
         self._was_armed = False
         self._lost_s: float | None = None
+        self._waits_s: float | None = None
         self._state = SafetyState.STATE_UNSPECIFIED
         self._why = ""
 
@@ -25,8 +28,13 @@ class ArmWatch:
         """Store the gate's state."""
         self._state = message.state
         self._was_armed |= message.state == SafetyState.STATE_ARMED
+        if self._was_armed:
+            self._waits_s = None
+        elif self._waits_s is None:
+            self._waits_s = now_s
         if not self._was_armed or message.state in _AT_WORK:
             self._lost_s = None
+            self._why = "; ".join(fault.detail for fault in message.faults)
             return
         self._why = "; ".join(fault.detail for fault in message.faults) or self._why
         if self._lost_s is None:
@@ -37,6 +45,12 @@ class ArmWatch:
     def lost(self) -> bool:
         """Whether the arm was armed and is not any more."""
         return self._lost_s is not None
+
+    def first_arming(self, now_s: float) -> str:
+        """The request to a person who has not armed the arm yet; empty where none is needed."""
+        if self._waits_s is None or now_s - self._waits_s < UNARMED_S:
+            return ""
+        return f"Please arm the arm, in a terminal: paramove arm enable{f' ({self._why})' if self._why else ''}."
 
     @property
     def detail(self) -> str:

@@ -112,6 +112,9 @@ class Relocator:
         self._now_s = now_s
         if not self.state:
             self._rest()
+        elif arming := self._watch.first_arming(now_s):
+            if self.detail != arming:
+                self._speak(arming)
         elif not self.finished and not self._watch.lost:
             self._steps[self.state]()
         self._goal_client.step(now_s, self._outgoing)

@@ -73,6 +73,9 @@ class RuleLearner:
         app.now_s = now_s
         if self._stage is None:
             self._enter(Calibrating(app))
+        elif arming := self._watch.first_arming(now_s):
+            if app.detail != arming:
+                app.speak(arming)
         elif not self._finished and not self._watch.lost:
             following = self._stage.step()
             if following is not None:

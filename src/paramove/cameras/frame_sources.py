@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import cv2
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
+from paramove.cameras.camera_socket import CameraSocket
 from paramove.cameras.frames import EndOfFrames, Frame, FrameError, image_of_raw
 from paramove.cameras.replayed_frames import FolderFrames, RecordingFrames
 from paramove.devices import holders
@@ -127,7 +128,7 @@ class FileFrames:
 
 
 class DeviceFrames:
-    """Frames of a V4L2 device, read by a thread that stores only the latest, so that frames are not delayed.
+    """Frames of a V4L2 device or a program's socket, read by a thread that stores only the latest: no frame is late.
 
     A device that was unplugged may block a read for ten seconds or hand out its last frame again (opencv #5221,
     #14044): missing frames are detected here after `timeout_ns` of the caller's clock, repeated ones by `FrameChecks`.
@@ -231,15 +232,21 @@ class _Reader:
             self._capture.release()
 
 
-def open_source(source: str, width_px: int, height_px: int) -> FrameSource:
-    """The source that the text names. Raises InputError if it is unknown or cannot be opened."""
+def open_source(source: str, width_px: int, height_px: int, folder: Path = Path()) -> FrameSource:
+    """The source that the text names. Raises InputError if it is unknown or cannot be opened.
+
+    Args:
+        source: See `SOURCES`.
+        width_px, height_px: Requested from a device.
+        folder: That the path of a device starts from.
+    """
     kind, _, rest = source.partition(":")
     if kind == "topic" and rest == "camera/image_raw":
         return TopicFrames()
     if kind == "file" and rest:
         return FileFrames(Path(rest))
     if kind == "device" and rest:
-        return DeviceFrames(rest, width_px, height_px)
+        return DeviceFrames(rest if rest.isdigit() else str(folder / rest), width_px, height_px)
     if kind == "folder" and rest:
         path, _, rate = rest.rpartition("@")
         try:
@@ -253,6 +260,13 @@ def open_source(source: str, width_px: int, height_px: int) -> FrameSource:
     raise SourceError(f"camera source {source!r}: {SOURCES} expected")
 
 
+def _offered(path: Path) -> Capture:
+    try:
+        return CameraSocket(path)
+    except OSError as error:
+        raise SourceError(f"no program offers images at {path}: {error.strerror}", missing=True) from error
+
+
 def _open_v4l2(path: str) -> Capture:
     """Raises SourceError with the devices found, the remedy for missing permissions, or the holder of the device."""
     device = Path(path)
@@ -264,6 +278,8 @@ def _open_v4l2(path: str) -> Capture:
     except PermissionError as denied:
         raise SourceError(f"no right to read {path}: run 'sudo usermod -aG video $USER' and log in again") from denied
     except OSError as error:
+        if device.is_socket():
+            return _offered(device)
         raise SourceError(f"{path} cannot be opened: {error.strerror}; a V4L2 camera expected") from error
     capture: Capture = cv2.VideoCapture(path, cv2.CAP_V4L2)
     if not capture.isOpened():

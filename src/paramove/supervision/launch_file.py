@@ -76,7 +76,8 @@ def load(
         seed: Written into each of the file's `seed_parameters`.
         headless: Sets the parameters that the file names under `headless`, before `settings`.
         robot: Written into the parameter `robot` of each node for which the files give one, before `settings`. For one
-            with a chain of servos the overlay `servo_arm` is laid on top, if the launch file has one.
+            with a chain of servos the overlay `servo_arm` is laid on top, if the launch file has one, with each
+            `servo_arm_NAME` that there is for an overlay NAME.
 
     Raises LaunchFileMissingError, or DocumentError with all that is wrong.
     """
@@ -117,8 +118,9 @@ def _with_overlays(
         chosen = list(overlays)
         paths = [_typed(workspace, folders, overlay, "overlay") for overlay in chosen]
     if robot is not None and SERVO_ARM in workspace.names(folders[0]) and _has_chain(workspace, robot):
-        chosen = [*chosen, SERVO_ARM]
-        paths.append(_named(workspace, folders, SERVO_ARM))
+        names = [SERVO_ARM, *(f"{SERVO_ARM}_{overlay}" for overlay in chosen)]
+        laid = {name: path for name in names if (path := _named(workspace, folders, name)).is_file()}
+        chosen, paths = [*chosen, *laid], [*paths, *laid.values()]
     for path in paths:
         try:
             top = _read(path)

@@ -1,0 +1,82 @@
+"""A camera that another program offers at a Unix socket: JPEG images, each after its length, 4 bytes big-endian."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+LENGTH = struct.Struct(">I")
+MAX_BYTES = 2**24
+
+
+class CameraSocket:
+    """Receives the images as OpenCV's `VideoCapture` does; raises OSError if nobody offers them.
+
+    Args:
+        path: Of the socket.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._socket = socket.socket(socket.AF_UNIX)
+        self._encoded = b""
+        try:
+            with short_name(path) as name:
+                self._socket.connect(name)
+        except OSError:
+            self._socket.close()
+            raise
+
+    def isOpened(self) -> bool:  # noqa: N802
+        """Whether somebody offers images."""
+        return True
+
+    def grab(self) -> bool:
+        """Waits for an image; False once there will be none any more."""
+        size = LENGTH.unpack(self._receive(LENGTH.size) or bytes(LENGTH.size))[0]
+        self._encoded = self._receive(size) if 0 < size <= MAX_BYTES else b""
+        return bool(self._encoded)
+
+    def retrieve(self) -> tuple[bool, Any]:
+        """Whether the grabbed image is sound, and the image, BGR."""
+        image = cv2.imdecode(np.frombuffer(self._encoded, dtype=np.uint8), cv2.IMREAD_COLOR)
+        return image is not None, image
+
+    def get(self, prop: int) -> float:
+        """Nothing is known of the camera."""
+        return 0.0
+
+    def set(self, prop: int, value: float) -> bool:
+        """Nothing can be requested."""
+        return False
+
+    def release(self) -> None:
+        """Disconnects."""
+        self._socket.close()
+
+    def _receive(self, size: int) -> bytes:
+        """So many bytes; none if the connection ended before."""
+        received = bytearray()
+        while len(received) < size:
+            part = self._socket.recv(size - len(received))
+            if not part:
+                return b""
+            received += part
+        return bytes(received)
+
+
+@contextlib.contextmanager
+def short_name(path: Path) -> Iterator[str]:
+    """A name of a socket that is short enough for the system, however long its path is."""
+    folder = os.open(path.absolute().parent, os.O_PATH | os.O_DIRECTORY)
+    try:
+        yield f"/proc/self/fd/{folder}/{path.name}"
+    finally:
+        os.close(folder)
