@@ -14,7 +14,7 @@ import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.bus import Topic
-from paramove.cameras import LENGTH, short_name
+from paramove.cameras import framed, short_name
 from sim.camera import ImageSource
 
 JPEG_QUALITY = 95
@@ -63,7 +63,7 @@ class OfferedCamera:
         bgr = cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR)
         _, encoded = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
         try:
-            self._client.sendall(LENGTH.pack(len(encoded)) + encoded.tobytes())
+            self._client.sendall(framed(encoded.tobytes()))
         except OSError:  # gone, or too slow for half an image
             self._disconnect()
 

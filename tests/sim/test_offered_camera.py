@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from paramove.bus import topics
-from paramove.cameras import LENGTH
 from paramove.cameras.camera_socket import CameraSocket, short_name
 from paramove.cameras.frame_sources import SourceError, open_source
 from sim.camera import raw_image
@@ -78,7 +77,7 @@ def test_a_length_that_no_image_has_is_the_end(offered, tmp_path):
     capture = CameraSocket(tmp_path / LONG / "camera")
     list(offered.images(None, 1, 1))
     capture.grab()
-    offered._client.sendall(LENGTH.pack(2**31))
+    offered._client.sendall((2**31).to_bytes(4, "big"))
     assert not capture.grab()
     capture.release()
 

@@ -15,7 +15,7 @@ from .calibration import check_square as check_square
 from .calibration_images import ImageSource as ImageSource
 from .calibration_images import LiveImages as LiveImages
 from .calibration_images import file_source as file_source
-from .camera_socket import LENGTH as LENGTH
+from .camera_socket import framed as framed
 from .camera_socket import short_name as short_name
 from .charuco_board import MARKERS as MARKERS
 from .charuco_board import UNSIZED_BOARD_ID as UNSIZED_BOARD_ID

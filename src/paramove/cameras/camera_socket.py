@@ -13,7 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-LENGTH = struct.Struct(">I")
+_LENGTH = struct.Struct(">I")
 MAX_BYTES = 2**24
 
 
@@ -40,7 +40,7 @@ class CameraSocket:
 
     def grab(self) -> bool:
         """Waits for an image; False once there will be none any more."""
-        size = LENGTH.unpack(self._receive(LENGTH.size) or bytes(LENGTH.size))[0]
+        size = _LENGTH.unpack(self._receive(_LENGTH.size) or bytes(_LENGTH.size))[0]
         self._encoded = self._receive(size) if 0 < size <= MAX_BYTES else b""
         return bool(self._encoded)
 
@@ -70,6 +70,11 @@ class CameraSocket:
                 return b""
             received += part
         return bytes(received)
+
+
+def framed(encoded: bytes) -> bytes:
+    """A JPEG image as it goes over the socket."""
+    return _LENGTH.pack(len(encoded)) + encoded
 
 
 @contextlib.contextmanager
