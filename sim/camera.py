@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from typing import Protocol
 
@@ -16,9 +16,12 @@ from paramove.bus import Topic, topics
 from paramove.diagnosis import graphics_backend
 from paramove.documents import Image
 from sim import looks, scene
+from sim.drawn_person import DrawnPerson
 from sim.looks import Camera, Looks
 
 NOISE_IMAGES = 8
+VIEW_DIFFUSE, VIEW_AMBIENT = 0.36, 0.20
+"""Of each light in the view for people, whatever the light in the world."""
 
 
 class GraphicsError(RuntimeError):
@@ -58,12 +61,15 @@ class Eye:
         self._upside_down = np.empty((height_px, width_px, 3), dtype=np.uint8)
         self._picture = np.empty_like(self._upside_down)
 
-    def look(self, data: mujoco.MjData, camera: str) -> Image:
-        """The picture of the camera of that name. The array is used again by the next call."""
+    def look(
+        self, data: mujoco.MjData, camera: str, adorn: Callable[[mujoco.MjvScene], None] = lambda _: None
+    ) -> Image:
+        """The picture of the camera of that name; `adorn` changes what is drawn. The next call uses the array again."""
         self._gl.make_current()
         self._camera.fixedcamid = self._model.camera(camera).id
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(self._model, data, self._options, None, self._camera, every, self._scene)
+        adorn(self._scene)
         port = mujoco.MjrRect(0, 0, *self._size)
         mujoco.mjr_render(port, self._scene, self._context)
         mujoco.mjr_readPixels(self._upside_down, None, port, self._context)
@@ -136,15 +142,36 @@ class RobotCamera:
 
 
 class ViewForPeople:
-    """A view of the whole scene without lens and noise; see `ImageSource`."""
+    """A view of the whole scene without lens and noise, in good light; see `ImageSource`.
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    Args:
+        model: Of the world.
+        person: Drawn around the person's hand; None: the hand is drawn as it is.
+    """
+
+    def __init__(self, model: mujoco.MjModel, person: DrawnPerson | None = None) -> None:
         self._eye = Eye(model, *scene.VIEW_PX)
+        self._person = person
+        self._hand = int(model.body_mocapid[model.body(scene.HAND).id])
+        self._sleeve = model.geom("hand_sleeve").id
         self.close = self._eye.close
 
     def images(self, data: mujoco.MjData, tick: int, now_ns: int) -> Iterator[tuple[Topic, RawImage]]:
         """See `ImageSource.images`."""
-        yield topics.TRUTH_VIEW, raw_image(self._eye.look(data, "view"), "view", now_ns)
+
+        def adorn(drawn: mujoco.MjvScene) -> None:
+            for light in drawn.lights[: drawn.nlight]:
+                light.diffuse[:], light.ambient[:] = VIEW_DIFFUSE, VIEW_AMBIENT
+            if self._person is None:
+                return
+            for geom in drawn.geoms[: drawn.ngeom]:
+                if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid == self._sleeve:
+                    geom.rgba[3] = 0.0  # the drawn arm has its own
+            turn = np.zeros(9)
+            mujoco.mju_quat2Mat(turn, data.mocap_quat[self._hand])
+            self._person.draw(drawn, data.mocap_pos[self._hand], turn.reshape(3, 3)[:, 2])
+
+        yield topics.TRUTH_VIEW, raw_image(self._eye.look(data, "view", adorn), "view", now_ns)
 
 
 def with_noise(image: Image, deviation: float, draw: np.random.Generator) -> Image:

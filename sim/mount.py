@@ -37,6 +37,7 @@ class Mount:
         gripper: Site of the end effector. root: the robot's first body.
         sides: Name of a geom or body -> side of the hand that it is part of; an object is held between two.
         object_radius: Of the objects, which its gripper can hold and feel, m.
+        table_edge: x of the table's near edge, frame of the tool box's measures, m: a servo arm stands on it.
     """
 
     description: RobotDescription
@@ -46,6 +47,7 @@ class Mount:
     root: str
     sides: Mapping[str, str]
     object_radius: float = tool_box.CYLINDER_RADIUS
+    table_edge: float = tool_box.X_RANGE[0] - 0.005
 
     @classmethod
     def of(cls, description: RobotDescription, spec: mujoco.MjSpec) -> Mount:
@@ -59,7 +61,7 @@ class Mount:
         root = spec.worldbody.first_body().name
         radius = 0.5 * float(np.clip(OBJECT_WIDTH, *description.chain.object_width))
         gripper = description.chain.sites.end_effector
-        return cls(description, -ARM_IN_SHOULDER, np.zeros(3), gripper, root, sides, radius)
+        return cls(description, -ARM_IN_SHOULDER, np.zeros(3), gripper, root, sides, radius, ARM_IN_SHOULDER[0] - 0.14)
 
     def add_stand(self, spec: mujoco.MjSpec, look: tuple[float, ...]) -> None:
         """The block under a servo arm; HOAP-3 stands behind the table."""

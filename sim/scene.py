@@ -34,10 +34,13 @@ RGBA = {
     "hand": (0.85, 0.10, 0.60, 1.0),
     "sleeve": (0.72, 0.72, 0.74, 1.0),
     "table": (0.70, 0.68, 0.64, 1.0),
-    "floor": (0.62, 0.62, 0.63, 1.0),
     "box": (0.56, 0.55, 0.53, 1.0),
     "lining": (0.13, 0.13, 0.13, 1.0),
 }
+FLOOR = ((0.66, 0.66, 0.67), (0.57, 0.57, 0.58))
+"""Colours of its tiles."""
+FAR_EDGE = 0.60
+"""Of the table, where the person sits; frame of the tool box's measures, m."""
 HAND = "person_hand"
 """Body of the person's hand; robots have hands, too."""
 HIDDEN_GROUP = 3
@@ -46,7 +49,7 @@ RENDERED_PX = (
     looks.WIDTH_PX + 2 * round(looks.WIDTH_PX / 2 * MARGIN_SHARE),
     looks.HEIGHT_PX + 2 * round(looks.HEIGHT_PX / 2 * MARGIN_SHARE),
 )
-VIEW_PX = (480, 360)
+VIEW_PX = (640, 480)
 
 NOMINAL_LIGHT = 0.36  # of each light at brightness 1
 AMBIENT_SHARE = 0.35
@@ -65,7 +68,7 @@ def build(world_looks: Looks, robot: RobotDescription, furnish: Furnish | None =
     world_from_shoulder = mount.origin
     mount.add_stand(spec, RGBA["table"])
     _add_lights(spec, world_looks.brightness)
-    _add_surroundings(spec, world_from_shoulder)
+    _add_surroundings(spec, world_from_shoulder, mount.table_edge)
     _add_box(spec, world_from_shoulder, world_looks.measures)
     _add_cylinders(spec, world_from_shoulder, mount.object_radius)
     _add_hand(spec, world_from_shoulder)
@@ -128,15 +131,15 @@ def _touchable(**more: Any) -> dict[str, Any]:
     }
 
 
-def _add_surroundings(spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
-    near_edge = world_from_shoulder[0] + tool_box.X_RANGE[0] - 0.005
-    thickness, depth, half_width = 0.02, 0.46, 0.80
+def _add_surroundings(spec: mujoco.MjSpec, world_from_shoulder: Floats, near_edge: float) -> None:
+    thickness, half_width = 0.02, 0.80
+    edges = world_from_shoulder[0] + np.array((near_edge, FAR_EDGE))
     table_z = world_from_shoulder[2] + tool_box.TABLE_Z
     spec.worldbody.add_geom(
         name="table",
         type=mujoco.mjtGeom.mjGEOM_BOX,
-        pos=(near_edge + depth, 0.0, table_z - thickness / 2),
-        size=(depth, half_width, thickness / 2),
+        pos=(edges.mean(), 0.0, table_z - thickness / 2),
+        size=(np.ptp(edges) / 2, half_width, thickness / 2),
         rgba=RGBA["table"],
         **_touchable(),
     )
@@ -149,12 +152,23 @@ def _add_surroundings(spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
         width=32,
         height=192,
     )
+    spec.add_texture(
+        name="floor",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=FLOOR[0],
+        rgb2=FLOOR[1],
+        width=64,
+        height=64,
+    )
+    tiles = spec.add_material(name="floor", texrepeat=(5.0, 5.0), texuniform=True)
+    tiles.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
     spec.worldbody.add_geom(  # the robot hangs above it; what falls off the table stays on it
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         pos=(0.0, 0.0, -0.36),
         size=(3.0, 3.0, 0.1),
-        rgba=RGBA["floor"],
+        material="floor",
         **_touchable(),
     )
 
@@ -297,7 +311,7 @@ def _add_cameras(spec: mujoco.MjSpec, world_looks: Looks, world_from_shoulder: F
         quat=quaternion_of(camera.shoulder_from_optical @ flip),
         fovy=float(np.rad2deg(2 * np.arctan(RENDERED_PX[1] / 2 / camera.focal_px))),
     )
-    place_view(spec, (0.62, -0.62, 0.36), (0.09, -0.13, 0.02))
+    place_view(spec, (0.30, 1.32, 0.68), (0.30, -0.15, 0.10))
 
 
 def place_view(spec: mujoco.MjSpec, eye: Any, target: Any) -> None:

@@ -9,6 +9,7 @@ from paramove.robots import RobotDescription
 from paramove.robots.dynamixel import PACING_SOCKET
 from sim import looks, tool_box
 from sim.camera import ImageSource, RobotCamera, ViewForPeople
+from sim.drawn_person import DrawnPerson
 from sim.hoap3 import Hoap3
 from sim.instructor import Instructor
 from sim.looks import Looks
@@ -65,7 +66,8 @@ def at_the_tool_box(
         robot = ServoArm(description, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed, lockstep)
     tracked = None if options.scene == "rule_learning" else TrackedPerson(options.seed)
     world = World(world_looks, description, None if tracked is None else tracked.furnish)
-    cameras: list[ImageSource] = [ViewForPeople(world.model)] if options.video else []
+    drawn = DrawnPerson(world.world_from_shoulder) if tracked is None else None
+    cameras: list[ImageSource] = [ViewForPeople(world.model, drawn)] if options.video else []
     if options.camera and options.scene != "relocate_by_pointing":
         camera: ImageSource = RobotCamera(world.model, world_looks, draws["noise"])
         socket = options.camera_socket

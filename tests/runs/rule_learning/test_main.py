@@ -32,7 +32,7 @@ def test_successful_run_gets_numbers_report_and_video(folder, capsys):
     frames = 0
     while video.read()[0]:
         frames += 1
-    assert frames == 40 + 20  # every third of 120 views, and the last one for two seconds
+    assert frames == 120 + 60  # all 120 views, and the last one for two seconds
 
 
 def test_failed_run_exits_with_3_and_says_why(folder, capsys):

@@ -22,8 +22,10 @@ from paramove.msgs.gesture_pb2 import Gesture
 from paramove.runs.recorded_run import recording_in
 from paramove.runs.video_writer import VideoWriter
 
-WIDTH_PX = 960
-RATE_HZ = 15.0
+SIZE = (1280, 720)
+RATE_HZ = 30.0
+REPEATED = 2
+"""Images come at 15 Hz."""
 BALL_PX = 9.0
 DISPLAYED_S = 1.5
 """How long a gesture is displayed."""
@@ -37,10 +39,15 @@ def write_pointing_video(folder: Path, console: Console) -> Path | None:
         return None
     path = folder / "pointing.mp4"
     height, width = decode(frames[0][0]).shape[:2]
-    size = (WIDTH_PX, round(WIDTH_PX * height / width) // 2 * 2)
-    with replacing(path) as unfinished, VideoWriter(unfinished, size, RATE_HZ) as writer:
+    scale = min(SIZE[0] / width, SIZE[1] / height)
+    inner = (round(scale * width), round(scale * height))
+    left, top = (SIZE[0] - inner[0]) // 2, (SIZE[1] - inner[1]) // 2
+    with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, RATE_HZ) as writer:
         for image, outline, caption in track(frames, "video", console=console, transient=True):
-            writer.write(drawn(decode(image), outline, caption, size))
+            picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
+            picture[top : top + inner[1], left : left + inner[0]] = drawn(decode(image), outline, caption, inner)
+            for _ in range(REPEATED):
+                writer.write(picture)
     return path
 
 

@@ -31,10 +31,10 @@ from paramove.runs.rule_learning.video_frame import (
 )
 from paramove.runs.video_writer import VideoWriter
 
-FRAMES_PER_S = 10.0
-EVERY = 3
+FRAMES_PER_S = 30.0
+EVERY = 1
 """So many-th image; at 15 Hz the video is twice as fast as the run."""
-LINGER_FRAMES = 20
+LINGER_FRAMES = 60
 MAX_LETTERS = 104
 CAMERA = topics.CAMERA_IMAGES[0].name
 
@@ -53,12 +53,12 @@ def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
         frames = track(_frames(run.folder), "video", views // EVERY, console=console, transient=True)
         for time_ns, camera, outline, view in frames:
             picture = composed(camera, outline, view)
-            paste(picture, label(title, 15, TEXT, bold=True), 12, 9)
-            paste(picture, label(f"{_latest(states, time_ns)}", 15, ACCENT), 420, 9)
-            clock = label(f"{time_ns * 1e-9:6.1f} s   2× speed", 14, FAINT)
-            paste(picture, clock, SIZE[0] - clock.shape[1] - 12, 10)
-            caption = label(_quoted(_latest(speech, time_ns)), 16, TEXT, bold=True)
-            paste(picture, caption, 14, TOP_PX + PANEL[1] + 14)
+            paste(picture, label(title, 20, TEXT, bold=True), 16, 12)
+            paste(picture, label(f"{_latest(states, time_ns)}", 20, ACCENT), 560, 12)
+            clock = label(f"{time_ns * 1e-9:6.1f} s   2× speed", 19, FAINT)
+            paste(picture, clock, SIZE[0] - clock.shape[1] - 16, 13)
+            caption = label(_quoted(_latest(speech, time_ns)), 22, TEXT, bold=True)
+            paste(picture, caption, 18, TOP_PX + PANEL[1] + 30)
             writer.write(picture)
         for _ in range(LINGER_FRAMES):
             writer.write(picture)
@@ -72,8 +72,8 @@ def composed(camera_bgr: Image, outline: Any | None, view: Image) -> Image:
     body = frame[TOP_PX : SIZE[1] - BOTTOM_PX]
     body[:, : PANEL[0]] = drawn(camera_bgr, outline, "", PANEL)
     body[:, PANEL[0] :] = cv2.resize(view, PANEL)
-    paste(body, label("camera 1, the tracked arm, and the ball where it points", 12, TEXT), 8, PANEL[1] - 22, True)
-    paste(body, label("the world: not shown to the robot", 12, TEXT), PANEL[0] + 8, PANEL[1] - 22, True)
+    paste(body, label("camera 1, the tracked arm, and the ball where it points", 16, TEXT), 10, PANEL[1] - 30, True)
+    paste(body, label("the world: not shown to the robot", 16, TEXT), PANEL[0] + 10, PANEL[1] - 30, True)
     return frame
 
 

@@ -18,11 +18,11 @@ from paramove.runs.rule_learning.summary import RunEvaluation
 from paramove.runs.rule_learning.video_frame import SIZE, VideoFrame
 from paramove.runs.video_writer import VideoError, VideoWriter
 
-FRAMES_PER_S = 10.0
+FRAMES_PER_S = 30.0
 CAMERA_HZ = 15.0
 LONG_RUN_S = 400.0
 """A longer run is displayed four times as fast as it was, others twice."""
-LINGER_FRAMES = 20  # the last picture stays so long
+LINGER_FRAMES = 60  # the last picture stays so long
 
 
 def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:

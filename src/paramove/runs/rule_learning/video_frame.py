@@ -17,8 +17,8 @@ from paramove.runs.rule_learning.story import RobotState
 
 Colour = tuple[int, int, int]
 
-PANEL = (480, 360)
-TOP_PX, BOTTOM_PX = 36, 108
+PANEL = (640, 480)
+TOP_PX, BOTTOM_PX = 48, 192
 SIZE = (2 * PANEL[0], TOP_PX + PANEL[1] + BOTTOM_PX)
 
 BACK: Colour = (24, 27, 33)
@@ -47,31 +47,32 @@ class VideoFrame:
         frame = np.empty((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         frame[:] = BACK
         body = frame[TOP_PX : TOP_PX + PANEL[1]]
-        view_of_robot = self._steady.update(np.asarray(cv2.resize(camera, PANEL), dtype=np.uint8))
-        draw_estimates(view_of_robot, state)
+        zoom = PANEL[0] / camera.shape[1]
+        view_of_robot = cv2.resize(self._steady.update(camera), PANEL, interpolation=cv2.INTER_CUBIC)
+        draw_estimates(np.asarray(view_of_robot), state, zoom)
         body[:, : PANEL[0]] = view_of_robot
         body[:, PANEL[0] :] = cv2.resize(view, PANEL)
-        paste(body, label("camera: what the robot sees", 12, TEXT), 8, PANEL[1] - 22, shade=True)
-        paste(body, label("the world: not shown to the robot", 12, TEXT), PANEL[0] + 8, PANEL[1] - 22, shade=True)
+        paste(body, label("camera: what the robot sees", 16, TEXT), 10, PANEL[1] - 30, shade=True)
+        paste(body, label("the world: not shown to the robot", 16, TEXT), PANEL[0] + 10, PANEL[1] - 30, shade=True)
         self._top(frame[:TOP_PX], state, time_s)
         _captions(frame[TOP_PX + PANEL[1] :], state)
         done = round(SIZE[0] * min(1.0, time_s / end_s)) if end_s > 0 else 0
-        frame[-3:, :done] = ACCENT
+        frame[-4:, :done] = ACCENT
         return frame
 
     def _top(self, bar: Image, state: RobotState, time_s: float) -> None:
-        paste(bar, label(self._title, 15, TEXT, bold=True), 12, 9)
+        paste(bar, label(self._title, 20, TEXT, bold=True), 16, 12)
         reached = len(STAGES) if state.stage == "done" else STAGES.index(state.stage) if state.stage in STAGES else -1
-        x = 400
+        x = 534
         for index, stage in enumerate(STAGES):
             now = index == reached
             colour = ACCENT if now else TEXT if index < reached else FAINT
             text = f"{'✓' if index < reached else index + 1} {stage}"
-            sprite = label(text, 15, colour, bold=now)
-            paste(bar, sprite, x, 9)
-            x += sprite.shape[1] + 26
-        clock = label(f"{time_s:6.1f} s   {self._factor:g}× speed", 14, FAINT)
-        paste(bar, clock, SIZE[0] - clock.shape[1] - 12, 10)
+            sprite = label(text, 20, colour, bold=now)
+            paste(bar, sprite, x, 12)
+            x += sprite.shape[1] + 35
+        clock = label(f"{time_s:6.1f} s   {self._factor:g}× speed", 19, FAINT)
+        paste(bar, clock, SIZE[0] - clock.shape[1] - 16, 13)
 
 
 class SteadyImage:
@@ -96,67 +97,67 @@ class SteadyImage:
         return self._held.copy()
 
 
-def draw_estimates(image: Image, state: RobotState) -> None:
-    """Tracked objects, the hand, the goal, the estimated openings, drawn into the camera's image."""
+def draw_estimates(image: Image, state: RobotState, zoom: float) -> None:
+    """Tracked objects, hand, goal and estimated openings, drawn into the camera's image, enlarged by `zoom`."""
     if state.homography is not None:
         for name, opening in state.rules.items():
-            at = _pixel(state.homography, opening)
-            cv2.circle(image, at, 13, COLOURS.get(name, TEXT), 1, cv2.LINE_AA)
-            cv2.drawMarker(image, at, COLOURS.get(name, TEXT), cv2.MARKER_CROSS, 8, 1, cv2.LINE_AA)
+            at = _pixel(state.homography, opening, zoom)
+            cv2.circle(image, at, 17, COLOURS.get(name, TEXT), 2, cv2.LINE_AA)
+            cv2.drawMarker(image, at, COLOURS.get(name, TEXT), cv2.MARKER_CROSS, 11, 2, cv2.LINE_AA)
         if state.goal is not None and state.goal.fetches:
-            start = _pixel(state.homography, tuple(state.goal.source[:2]))
-            end = _pixel(state.homography, tuple(state.goal.target[:2]))
-            cv2.arrowedLine(image, start, end, ACCENT, 2, cv2.LINE_AA, tipLength=0.08)
+            start = _pixel(state.homography, tuple(state.goal.source[:2]), zoom)
+            end = _pixel(state.homography, tuple(state.goal.target[:2]), zoom)
+            cv2.arrowedLine(image, start, end, ACCENT, 3, cv2.LINE_AA, tipLength=0.08)
     for item in state.tracked.objects if state.tracked is not None else ():
         if item.kind == TrackedObject.KIND_HAND:
-            _draw_hand(image, item)
+            _draw_hand(image, item, zoom)
         else:
-            _draw_object(image, item, state)
+            _draw_object(image, item, state, zoom)
 
 
-def _draw_hand(image: Image, item: Any) -> None:
-    corners = np.array([(p.u_px, p.v_px) for p in item.outline]).round().astype(np.int32).reshape(-1, 1, 2)
+def _draw_hand(image: Image, item: Any, zoom: float) -> None:
+    corners = (zoom * np.array([(p.u_px, p.v_px) for p in item.outline])).round().astype(np.int32).reshape(-1, 1, 2)
     if len(corners):
-        cv2.polylines(image, [corners], True, HAND, 1, cv2.LINE_AA)
-    cv2.circle(image, (round(item.u_px), round(item.v_px)), 3, HAND, -1, cv2.LINE_AA)
+        cv2.polylines(image, [corners], True, HAND, 2, cv2.LINE_AA)
+    cv2.circle(image, (round(zoom * item.u_px), round(zoom * item.v_px)), 4, HAND, -1, cv2.LINE_AA)
 
 
-def _draw_object(image: Image, item: Any, state: RobotState) -> None:
+def _draw_object(image: Image, item: Any, state: RobotState, zoom: float) -> None:
     colour = COLOURS.get(item.name, TEXT)
-    left, top = round(item.left_px) - 2, round(item.top_px) - 2
-    right, bottom = left + round(item.width_px) + 4, top + round(item.height_px) + 4
-    cv2.rectangle(image, (left, top), (right, bottom), colour, 1, cv2.LINE_AA)
+    left, top = round(zoom * item.left_px) - 3, round(zoom * item.top_px) - 3
+    right, bottom = left + round(zoom * item.width_px) + 6, top + round(zoom * item.height_px) + 6
+    cv2.rectangle(image, (left, top), (right, bottom), colour, 2, cv2.LINE_AA)
     gesture = state.gesture
     fresh = gesture is not None and gesture.object == item.name
     text = state.seeing if fresh else item.name
-    sprite = label(text, 12, colour, bold=fresh)
+    sprite = label(text, 16, colour, bold=fresh)
     paste(image, sprite, left, max(0, top - sprite.shape[0] - 2), shade=True)
 
 
 def _captions(panel: Image, state: RobotState) -> None:
     if state.detail:
-        paste(panel, label(f"“{_shortened(state.detail, 96)}”", 17, TEXT, bold=True), 14, 12)
-    paste(panel, label("estimates", 13, FAINT), 14, 46)
-    x = 84
+        paste(panel, label(f"“{_shortened(state.detail, 96)}”", 23, TEXT, bold=True), 18, 24)
+    paste(panel, label("estimates", 17, FAINT), 18, 81)
+    x = 118
     for name, (u, v) in state.rules.items():
-        sprite = label(f"{name} → ({u * 100:.1f}, {v * 100:.1f}) cm".replace("-", "−"), 14, COLOURS.get(name, TEXT))
-        paste(panel, sprite, x, 45)
-        x += sprite.shape[1] + 26
+        sprite = label(f"{name} → ({u * 100:.1f}, {v * 100:.1f}) cm".replace("-", "−"), 19, COLOURS.get(name, TEXT))
+        paste(panel, sprite, x, 79)
+        x += sprite.shape[1] + 35
     if not state.rules:
-        paste(panel, label("nothing yet", 14, FAINT), x, 45)
-    paste(panel, label("does", 13, FAINT), 14, 74)
-    paste(panel, label(state.doing or "waits", 14, ACCENT if state.doing else FAINT), 84, 73)
-    paste(panel, label("detects", 13, FAINT), 494, 74)
-    paste(panel, label(state.seeing or "–", 14, TEXT if state.seeing else FAINT), 560, 73)
+        paste(panel, label("nothing yet", 19, FAINT), x, 79)
+    paste(panel, label("does", 17, FAINT), 18, 132)
+    paste(panel, label(state.doing or "waits", 19, ACCENT if state.doing else FAINT), 118, 130)
+    paste(panel, label("detects", 17, FAINT), 658, 132)
+    paste(panel, label(state.seeing or "–", 19, TEXT if state.seeing else FAINT), 746, 130)
 
 
 def _shortened(text: str, length: int) -> str:
     return text if len(text) <= length else text[: length - 1] + "…"
 
 
-def _pixel(homography: Any, position: tuple[float, float]) -> tuple[int, int]:
+def _pixel(homography: Any, position: tuple[float, float], zoom: float) -> tuple[int, int]:
     u, v = homography.image_from_plane(*position)
-    return round(float(np.clip(u, -999, 9999))), round(float(np.clip(v, -999, 9999)))
+    return round(float(np.clip(zoom * u, -999, 9999))), round(float(np.clip(zoom * v, -999, 9999)))
 
 
 @lru_cache(maxsize=8)
