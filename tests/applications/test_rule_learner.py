@@ -502,6 +502,21 @@ def test_an_arm_that_is_armed_again_in_time_goes_on(state: SafetyState.State) ->
     assert story.learner.failure == ""
 
 
+def test_where_nothing_is_found_where_it_is_seen_it_calibrates_again() -> None:
+    """As when its base or the camera was moved: the rules are then wrong, too."""
+    story = Story()
+    story.run_to(APPLY)
+    story.outcomes = [(FAILED, "felt nothing in the hand", None)] * 6
+    for stage in (CALIBRATE, LEARN):
+        story.run_to(stage)
+    assert "Was the camera moved, or my base?" in story.sentences()
+    assert story.requests().count("HELP") == 1, "first it is one object that is put elsewhere"
+    assert not story.rules[-1].rules or len(story.calibrations) == 2
+    story._known = set()
+    story.run_to(APPLY)
+    assert len(story.calibrations) == 2
+
+
 def test_an_arm_that_was_never_armed_is_waited_for() -> None:
     story = Story()
     story.learner.on_safety(safety(SafetyState.STATE_DISARMED))

@@ -148,6 +148,20 @@ def test_an_object_is_put_down_with_the_pitch_with_which_it_was_grasped() -> Non
 
 
 @each_arm
+def test_a_second_attempt_grasps_in_another_way(name: str) -> None:
+    plan, kinematics = reaching(name), description(name).chain.kinematics
+    pitches, openings = [], []
+    for attempt in (1, 2, 3):
+        motion = plan.fetch((0.15, 0.0, GRASP_Z), target=(0.15, 0.05, GRASP_Z), attempt=attempt)
+        at = motion.angles[round(dict(motion.phases)["grasp"] / 0.01)]
+        pitches.append(float(np.rad2deg(kinematics.forward(at[:-1]).pitch)))
+        openings.append(plan.arm.opening_of(float(at[-1])))
+        assert_playable(name, motion)
+    np.testing.assert_allclose(pitches, [90, 75, 90], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(openings, [0.6, 0.8, 0.6], rtol=0, atol=1e-6)
+
+
+@each_arm
 def test_begins_wherever_the_arm_is(name: str) -> None:
     plan, oracle = reaching(name), Oracle(name)
     start = plan.reach((0.10, -0.14, 0.05)).angles[-1]

@@ -17,6 +17,8 @@ NEAR = 0.035
 CLEARER_BY = 0.015
 """The second nearest object must be so much farther away, m."""
 HAND_AWAY_S = 0.3
+HELPED_IN_VAIN = 2
+"""So many objects in a row that no attempt brought away: then the calibration is no longer right."""
 SETTLED_S = 1.0
 """An object must have stood this long to be pointed at: before, the hand has just put it there."""
 
@@ -37,6 +39,7 @@ class Applying(Stage):
         self._stuck: set[str] = set()
         self._moved: set[str] = set()
         self._to_move = ""
+        self._in_vain = 0
 
     def enter(self) -> None:
         """Ask the instructor to point."""
@@ -167,20 +170,29 @@ class Applying(Stage):
             outdated = not self._failure and sighting.time_s < self._began_s
             if outdated and self.for_s < 2 * self.app.options.settle_s:
                 return None  # not detected since: the view is not settled yet
-            self._try_again(sighting.position)
-            return None
+            return self._try_again(sighting.position)
         if self.for_s > 3 * self.app.options.settle_s:
             self._ask_for_help(f"I have lost sight of {self._object}.")
         return None
 
-    def _try_again(self, place: Place) -> None:
-        reason = self._failure
-        if self._attempt >= self.app.options.attempts:
+    def _try_again(self, place: Place) -> ApplicationStage.Stage | None:
+        app, reason = self.app, self._failure
+        if self._attempt < app.options.attempts:
+            self._source = place
+            app.speak(f"{self._object} is at {cm(place)}{': ' + reason if reason else ''}. I try again.")
+            self._relocate()
+            return None
+        self._in_vain += 1
+        if self._in_vain < HELPED_IN_VAIN:
             self._ask_for_help(f"I tried {self._attempt} times to put {self._object} away: {reason or 'it stayed'}.")
-            return
-        self._source = place
-        self.app.speak(f"{self._object} is at {cm(place)}{': ' + reason if reason else ''}. I try again.")
-        self._relocate()
+            return None
+        app.speak(
+            f"Objects are not where I see them: {reason or 'they stay'}. Was the camera moved, or my base? "
+            "I calibrate again, and then need to see the rules again."
+        )
+        app.rules.clear()
+        app.done.clear()
+        return ApplicationStage.STAGE_CALIBRATE
 
     def _ask_for_help(self, detail: str, to_move: str = "") -> None:
         self._to_move = to_move or self._object
@@ -200,6 +212,7 @@ class Applying(Stage):
 
     def _put_away(self) -> ApplicationStage.Stage | None:
         self.app.done.add(self._object)
+        self._in_vain = 0
         self._stuck.clear()
         self._moved.clear()
         self.app.speak(f"{self._object} is put away.")

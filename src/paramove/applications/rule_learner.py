@@ -89,7 +89,8 @@ class RuleLearner:
         if stage == ApplicationStage.STAGE_DONE:
             self._finished = True
         else:
-            self._enter({Learning.stage: Learning, Applying.stage: Applying}[stage](self._app))
+            stages = {one.stage: one for one in (Calibrating, Learning, Applying)}
+            self._enter(stages[stage](self._app))
 
     def _enter(self, stage: Stage) -> None:
         self._stage = stage

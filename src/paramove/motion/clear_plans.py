@@ -114,12 +114,18 @@ class ClearPlans:
         return self.planner.movement.within_training(position)
 
     def fetch(
-        self, source: Floats, standing: Floats, start: RestPose | None = None, target: Floats | None = None
+        self,
+        source: Floats,
+        standing: Floats,
+        start: RestPose | None = None,
+        target: Floats | None = None,
+        attempt: int = 1,
     ) -> PlannedMotion:
-        """Reach from before the object as in 5.2.5; if that is not clear, lower the open hand over it."""
+        """Reach from before the object as in 5.2.5; if not clear, or at a second attempt, lower the hand over it."""
         _check_at_base(start)
         heights = (self.planner.options.entry_height, _HIGHER_ENTRY)
-        kinds = [(height, above) for above in (False, True) for height in heights]
+        first = attempt % 2 == 0
+        kinds = [(height, above) for above in (first, not first) for height in heights]
         alternatives = [partial(self.planner.fetch, source, height, above) for height, above in kinds]
         choices = [{"approach": kind, "lower": kind, "reach": kind[1]} for kind in kinds]
         return self._first(alternatives, standing, choices)

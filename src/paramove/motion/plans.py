@@ -48,9 +48,17 @@ class MotionPlans(Protocol):
         """ξ of the gripper that closes on an object, which stops it earlier."""
 
     def fetch(
-        self, source: Floats, standing: Floats, start: RestPose | None = None, target: Floats | None = None
+        self,
+        source: Floats,
+        standing: Floats,
+        start: RestPose | None = None,
+        target: Floats | None = None,
+        attempt: int = 1,
     ) -> PlannedMotion:
-        """Grasp the object at `source` and lift it, as suits the `target` of its delivery if that is known."""
+        """Grasp the object at `source` and lift it, as suits the `target` of its delivery if that is known.
+
+        Every second attempt grasps in another way.
+        """
 
     def deliver(self, start: RestPose, target: Floats, standing: Floats) -> PlannedMotion:
         """Carry the held object to `target`, release it, go back to the base pose."""

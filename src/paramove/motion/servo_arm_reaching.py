@@ -121,17 +121,23 @@ class ServoArmReaching:
         standing: Floats = NOTHING,
         start: RestPose | None = None,
         target: ArrayLike | None = None,
+        attempt: int = 1,
     ) -> PlannedMotion:
         """Grasp the object at `source` and lift it. Arguments and errors as for `reach`.
 
         Args:
             target: Where it will be delivered, [3], m: with the same pitch if possible, so that it stands upright.
+            attempt: Every second one is made with another pitch and a wider gripper.
         """
         point = self._beside(source, FINGER_GAP_M)
         pitch = self._pitch_of_both(point, None if target is None else self._beside(target))
+        opening = self.options.work_opening
+        if attempt % 2 == 0:
+            pitch = self._grasp_pitch(point, pitch - np.deg2rad(self.options.second_turn_deg))
+            opening = self.options.second_opening
         motion = self._begun(start, standing)
         motion.held_pitch = pitch
-        self._over(motion, "approach", point, pitch, self.options.work_opening)
+        self._over(motion, "approach", point, pitch, opening)
         self._line(motion, "lower", point, pitch)
         self._fingers(motion, "grasp", self.options.closed_opening)
         self._line(motion, "lift", *self._above(point, pitch), holding=True)
@@ -422,6 +428,8 @@ class ServoReachingOptions:
     gripper_duration: float = 0.8
     settle_duration: float = 0.4  # time for the closed gripper to press
     work_opening: float = 0.6  # ξ
+    second_opening: float = 0.8  # of every second attempt to grasp, and the turn of its hand from the first one's pitch
+    second_turn_deg: float = 15.0
     closed_opening: float = 0.0
     clearance: float = 0.005  # of every part from the table
     carry_clearance: float = 0.02

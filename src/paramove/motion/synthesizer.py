@@ -207,7 +207,7 @@ class Synthesizer:
     def _fetch(self, goal: RelocationGoal, then: Callable[[RestPose, Floats, Floats], PlannedMotion]) -> _Course:
         source, target, standing = point_of(goal, "from"), point_of(goal, "to"), standing_of(goal)
         known = target if goal.kind == RelocationGoal.KIND_RELOCATE else None
-        fetch = self._plans.fetch(source, standing, self._start_of(goal), known)
+        fetch = self._plans.fetch(source, standing, self._start_of(goal), known, goal.attempt)
         onwards = then(fetch.end, target, standing)  # known to be possible before the arm moves
         yield fetch
         if not self.holding:
