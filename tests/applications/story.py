@@ -17,6 +17,7 @@ from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
 
 TICK_NS = 66_666_667
 MOTION_S = 4.0
+WIDTH = 0.021
 CORNERS = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
 OPENINGS = {"yellow": (0.135, -0.038), "green": (0.135, -0.095), "blue": (0.135, 0.019)}
 PLACES = {"yellow": (0.170, 0.05), "green": (0.180, -0.08), "blue": (0.175, -0.02)}
@@ -116,6 +117,7 @@ class Story:
         seen = Gesture(kind=kind, object=name, u_px=u, v_px=v, located=self.calibrated)
         if self.calibrated:
             seen.x, seen.y, seen.frame = place[0], place[1], "right_shoulder"
+            seen.width_m = WIDTH if name else 0.0
         seen.captured.FromNanoseconds(self.now_ns)
         self._heard(topics.GESTURES, seen)
         self.learner.on_gesture(seen)

@@ -14,7 +14,7 @@ from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 from paramove.objects.homography import PlaneHomography
-from tests.applications.story import CORNERS, FAILED, OPENINGS, OPTIONS, PLACES, REJECTED, SUCCEEDED, Story
+from tests.applications.story import CORNERS, FAILED, OPENINGS, OPTIONS, PLACES, REJECTED, SUCCEEDED, WIDTH, Story
 
 CALIBRATE, LEARN = ApplicationStage.STAGE_CALIBRATE, ApplicationStage.STAGE_LEARN
 APPLY, DONE = ApplicationStage.STAGE_APPLY, ApplicationStage.STAGE_DONE
@@ -52,6 +52,7 @@ def test_the_whole_story() -> None:
         np.testing.assert_allclose(at_place(goal, "to"), OPENINGS[name], rtol=0, atol=1e-9)
         assert goal.to.z == getattr(goal, "from").z == OPTIONS.grasp_z
         assert goal.frame == "right_shoulder"
+        assert goal.object_width_m == WIDTH, "as it was seen"
 
 
 def test_it_calibrates_from_its_own_corners() -> None:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from paramove.motion.clear_plans import joined
 from paramove.motion.planned_motion import PlannedMotion
+from paramove.motion.plans import Grasp
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.robots.description import RobotDescription
 from tests.motion.reaching import reaching_model
@@ -25,7 +26,7 @@ def reaching(name: str) -> ServoArmReaching:
 
 def pick_and_place(name: str, source: ArrayLike, place: ArrayLike) -> PlannedMotion:
     """Both motions of a relocation."""
-    fetch = reaching(name).fetch(source, target=place)
+    fetch = reaching(name).fetch(source, grasp=Grasp(np.asarray(place)))
     return joined(fetch, reaching(name).deliver(fetch.end, place))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from paramove.motion.clearance import MAX_STANDING, ClearanceChecker, UprightCylinder, WorkSurface
 from paramove.motion.planned_motion import PlannedMotion, RestPose
-from paramove.motion.plans import NoPlanError
+from paramove.motion.plans import Grasp, NoPlanError
 from paramove.motion.servo_arm_reaching import FINGER_GAP_M, ServoArmReaching
 from paramove.robots.description import DescriptionError
 from paramove.robots.planar_arm import OutOfReachError
@@ -137,7 +137,7 @@ def test_an_object_is_put_down_with_the_pitch_with_which_it_was_grasped() -> Non
     near, far = (0.15, 0.0, GRASP_Z), (0.21, 0.05, GRASP_Z)
     plan, kinematics = reaching("koch_v1_1"), description("koch_v1_1").chain.kinematics
     for target in (far, None):
-        fetch = plan.fetch(near, target=target)
+        fetch = plan.fetch(near, grasp=Grasp(None if target is None else np.array(target)))
         deliver = plan.deliver(plan.hold(fetch.end, (0.13, -0.11, 0.10)).end, far)
         pitches = []
         for motion, phase in ((fetch, "grasp"), (deliver, "release")):
@@ -152,13 +152,28 @@ def test_a_second_attempt_grasps_in_another_way(name: str) -> None:
     plan, kinematics = reaching(name), description(name).chain.kinematics
     pitches, openings = [], []
     for attempt in (1, 2, 3):
-        motion = plan.fetch((0.15, 0.0, GRASP_Z), target=(0.15, 0.05, GRASP_Z), attempt=attempt)
+        motion = plan.fetch((0.15, 0.0, GRASP_Z), grasp=Grasp(np.array((0.15, 0.05, GRASP_Z)), attempt))
         at = motion.angles[round(dict(motion.phases)["grasp"] / 0.01)]
         pitches.append(float(np.rad2deg(kinematics.forward(at[:-1]).pitch)))
         openings.append(plan.arm.opening_of(float(at[-1])))
         assert_playable(name, motion)
     np.testing.assert_allclose(pitches, [90, 75, 90], rtol=0, atol=1e-6)
     np.testing.assert_allclose(openings, [0.6, 0.8, 0.6], rtol=0, atol=1e-6)
+
+
+@each_arm
+def test_an_object_of_another_width_is_grasped_at_its_middle_or_rejected(name: str) -> None:
+    plan, oracle = reaching(name), Oracle(name)
+    narrowest, widest = oracle.chain.object_width
+    source, face = np.array((0.15, -0.05, GRASP_Z)), oracle.chain.fixed_finger
+    for width in (narrowest, widest):
+        motion = plan.fetch(source, grasp=Grasp(width=width))
+        aside = oracle.object_in(motion.angles[round(dict(motion.phases)["grasp"] / 0.01)], FINGER_GAP_M) - source
+        expected = 0.0 if face is None else abs(width / 2 - 0.010)
+        np.testing.assert_allclose(np.linalg.norm(aside), expected, rtol=0, atol=2e-4)
+    for width in (narrowest - 0.006, widest + 0.006):
+        with pytest.raises(NoPlanError, match=f"{1000 * width:.0f} mm wide"):
+            plan.fetch(source, grasp=Grasp(width=width))
 
 
 @each_arm

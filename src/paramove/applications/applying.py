@@ -119,6 +119,7 @@ class Applying(Stage):
             target=app.goals.position(app.rules[self._object]),
             avoid=standing.values(),
             attempt=self._attempt,
+            width=app.table.objects[self._object].width,
         )
         self.go("relocating")
 

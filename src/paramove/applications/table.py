@@ -18,6 +18,7 @@ class Sighting:
         time_s: Capture time.
         u_px, v_px: Image point.
         position: x, y in the plane's frame, m; None while there is no calibration.
+        width: Of the object, m; 0: not known.
     """
 
     kind: int
@@ -25,6 +26,7 @@ class Sighting:
     u_px: float
     v_px: float
     position: tuple[float, float] | None
+    width: float = 0.0
 
     @property
     def at_rest(self) -> bool:
@@ -63,7 +65,9 @@ class Table:
             self.hand_changed_s = time_s
         elif gesture.object and gesture.kind != Gesture.KIND_POINTED_AT:
             position = (gesture.x, gesture.y) if gesture.located else None
-            self.objects[gesture.object] = Sighting(gesture.kind, time_s, gesture.u_px, gesture.v_px, position)
+            self.objects[gesture.object] = Sighting(
+                gesture.kind, time_s, gesture.u_px, gesture.v_px, position, gesture.width_m
+            )
 
     def hand_away_for(self, now_s: float) -> float:
         """How long the hand has been out of view, s; 0 while it is in view."""

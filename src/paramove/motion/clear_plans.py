@@ -18,7 +18,7 @@ from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.clearance import ClearanceChecker
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.planned_motion import PlannedMotion, RestPose
-from paramove.motion.plans import NoPlanError, check_number
+from paramove.motion.plans import USUAL, Grasp, NoPlanError, check_number
 from paramove.motion.relocation import RelocationPlanner
 from paramove.motion.timing import minimum_jerk
 from paramove.robots import ArmKinematics
@@ -114,17 +114,12 @@ class ClearPlans:
         return self.planner.movement.within_training(position)
 
     def fetch(
-        self,
-        source: Floats,
-        standing: Floats,
-        start: RestPose | None = None,
-        target: Floats | None = None,
-        attempt: int = 1,
+        self, source: Floats, standing: Floats, start: RestPose | None = None, grasp: Grasp = USUAL
     ) -> PlannedMotion:
         """Reach from before the object as in 5.2.5; if not clear, or at a second attempt, lower the hand over it."""
         _check_at_base(start)
         heights = (self.planner.options.entry_height, _HIGHER_ENTRY)
-        first = attempt % 2 == 0
+        first = grasp.attempt % 2 == 0
         kinds = [(height, above) for above in (first, not first) for height in heights]
         alternatives = [partial(self.planner.fetch, source, height, above) for height, above in kinds]
         choices = [{"approach": kind, "lower": kind, "reach": kind[1]} for kind in kinds]

@@ -73,6 +73,14 @@ class Path:
 
 
 @dataclass(frozen=True)
+class Held:
+    """An object in the gripper: the hand's pitch when it grasped it, rad, and its width, m."""
+
+    pitch: float
+    width: float
+
+
+@dataclass(frozen=True)
 class RestPose:
     """Where an arm rests between motions.
 
@@ -80,13 +88,13 @@ class RestPose:
         angles: Arm joints and gripper, [J + 1], rad.
         gripper: Position of the end effector, [3], m, frame of the arm's base.
         measured: Whether the angles were measured; otherwise they are the end of a planned motion.
-        held_pitch: Pitch of the hand when it grasped what it holds, rad; None: not known.
+        held: How it holds an object; None: not known, or nothing.
     """
 
     angles: Floats
     gripper: Floats
     measured: bool = False
-    held_pitch: float | None = None
+    held: Held | None = None
 
 
 @dataclass(frozen=True)
@@ -100,7 +108,7 @@ class PlannedMotion:
         holding: Whether an object is held, [K].
         phases: Name and start of each phase.
         elbow_turn: Largest turn of the elbow for a joint limit, rad.
-        held_pitch: See `RestPose`.
+        held: See `RestPose`.
     """
 
     times: Floats
@@ -109,12 +117,12 @@ class PlannedMotion:
     holding: NDArray[np.bool_]
     phases: tuple[tuple[str, float], ...]
     elbow_turn: float
-    held_pitch: float | None = None
+    held: Held | None = None
 
     @property
     def end(self) -> RestPose:
         """Where it ends."""
-        return RestPose(self.angles[-1], self.gripper[-1], held_pitch=self.held_pitch)
+        return RestPose(self.angles[-1], self.gripper[-1], held=self.held)
 
 
 def motion_message(name: str, joints: Sequence[str], motion: PlannedMotion, now_ns: int) -> JointTrajectory:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 from paramove.documents import Floats
@@ -28,6 +29,24 @@ def check_number(standing: Floats) -> None:
         raise NoPlanError(f"{len(standing)} objects to keep clear of; at most {MAX_STANDING} at once are possible")
 
 
+@dataclass(frozen=True)
+class Grasp:
+    """What is known of a grasp beforehand.
+
+    Attributes:
+        target: Where the object is to be delivered, [3], m; None: not known yet.
+        attempt: From 1; every second one is made in another way.
+        width: Of the object, m; None: as objects usually are.
+    """
+
+    target: Floats | None = None
+    attempt: int = 1
+    width: float | None = None
+
+
+USUAL = Grasp()
+
+
 class MotionPlans(Protocol):
     """Plans motions of one arm. Positions are of the end effector, [3], m, in the frame of the arm's base.
 
@@ -48,17 +67,9 @@ class MotionPlans(Protocol):
         """ξ of the gripper that closes on an object, which stops it earlier."""
 
     def fetch(
-        self,
-        source: Floats,
-        standing: Floats,
-        start: RestPose | None = None,
-        target: Floats | None = None,
-        attempt: int = 1,
+        self, source: Floats, standing: Floats, start: RestPose | None = None, grasp: Grasp = USUAL
     ) -> PlannedMotion:
-        """Grasp the object at `source` and lift it, as suits the `target` of its delivery if that is known.
-
-        Every second attempt grasps in another way.
-        """
+        """Grasp the object at `source` and lift it."""
 
     def deliver(self, start: RestPose, target: Floats, standing: Floats) -> PlannedMotion:
         """Carry the held object to `target`, release it, go back to the base pose."""

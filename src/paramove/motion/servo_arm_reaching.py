@@ -22,8 +22,8 @@ from paramove.motion.hand_poses import HandPoses, metres
 from paramove.motion.learned_path import SMOOTHING, LearnedPath, PlacedPerson
 from paramove.motion.modelled_movement import robot_movement
 from paramove.motion.planar_path import NoJointPathError, planar_path
-from paramove.motion.planned_motion import PlannedMotion, RestPose
-from paramove.motion.plans import NoPlanError, check_number
+from paramove.motion.planned_motion import Held, PlannedMotion, RestPose
+from paramove.motion.plans import USUAL, Grasp, NoPlanError, check_number
 from paramove.motion.timing import minimum_jerk, ramped, rest_to_rest, smoothed
 from paramove.phmm import ParametricHMM
 from paramove.robots import DescriptionError, OutOfReachError, RobotDescription
@@ -40,6 +40,8 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 USUAL_REACH = 0.8
 """Quantile of the reachable distances: an object whose target is not known yet is grasped as for one so far away."""
+WIDTH_ERROR_M = 0.004
+"""Of a width that was measured in an image."""
 FINGER_GAP_M = 0.0045
 """Between an object to be grasped and the face of a finger that does not move: positions of objects are estimates."""
 NOTHING = np.empty((0, 2))
@@ -94,7 +96,8 @@ class ServoArmReaching:
         ahead = self._poses.ahead(o.table_z, self._band(o.grasp_band_deg))
         self._usual_reach = float(np.quantile(ahead[:, 0], USUAL_REACH) - self._arm.yaw_axis[0])
         self._person = PlacedPerson(robot_movement(model, length), ahead.mean(axis=0), self._arm.yaw_axis, POINTS)
-        self._fixed_finger, self._radius = chain.fixed_finger, min(cylinder.radius, 0.5 * chain.object_width[1])
+        self._fixed_finger, self._widths = chain.fixed_finger, chain.object_width
+        self._usual_width = min(2.0 * cylinder.radius, chain.object_width[1])
 
     def reach(self, position: ArrayLike, standing: Floats = NOTHING, start: RestPose | None = None) -> PlannedMotion:
         """Bring the end effector to a position with an open gripper, by the learned movement.
@@ -120,23 +123,22 @@ class ServoArmReaching:
         source: ArrayLike,
         standing: Floats = NOTHING,
         start: RestPose | None = None,
-        target: ArrayLike | None = None,
-        attempt: int = 1,
+        grasp: Grasp = USUAL,
     ) -> PlannedMotion:
         """Grasp the object at `source` and lift it. Arguments and errors as for `reach`.
 
-        Args:
-            target: Where it will be delivered, [3], m: with the same pitch if possible, so that it stands upright.
-            attempt: Every second one is made with another pitch and a wider gripper.
+        Where the target is known, it is grasped with a pitch that reaches that, too, so that it will stand upright.
+        Every second attempt is made with another pitch and a wider gripper.
         """
-        point = self._beside(source, FINGER_GAP_M)
-        pitch = self._pitch_of_both(point, None if target is None else self._beside(target))
+        width = self._held_width(grasp.width)
+        point = self._beside(source, width, FINGER_GAP_M)
+        pitch = self._pitch_of_both(point, None if grasp.target is None else self._beside(grasp.target, width))
         opening = self.options.work_opening
-        if attempt % 2 == 0:
+        if grasp.attempt % 2 == 0:
             pitch = self._grasp_pitch(point, pitch - np.deg2rad(self.options.second_turn_deg))
             opening = self.options.second_opening
         motion = self._begun(start, standing)
-        motion.held_pitch = pitch
+        motion.held = Held(pitch, width)
         self._over(motion, "approach", point, pitch, opening)
         self._line(motion, "lower", point, pitch)
         self._fingers(motion, "grasp", self.options.closed_opening)
@@ -145,8 +147,9 @@ class ServoArmReaching:
 
     def deliver(self, start: RestPose, target: ArrayLike, standing: Floats = NOTHING) -> PlannedMotion:
         """Carry the held object to `target`, release it, go back to the base pose. Errors as for `reach`."""
-        point = self._beside(target)
-        pitch = self._grasp_pitch(point, start.held_pitch)
+        held = start.held
+        point = self._beside(target, self._usual_width if held is None else held.width)
+        pitch = self._grasp_pitch(point, None if held is None else held.pitch)
         motion = self._begun(start, standing)
         self._over(motion, "carry", point, pitch, self.options.closed_opening, holding=True)
         self._put(motion, point, pitch)
@@ -157,7 +160,7 @@ class ServoArmReaching:
         point, o = np.asarray(position, dtype=np.float64), self.options
         pitch = self._poses.pitch_at(point, np.deg2rad(o.pitch_deg), self._band(o.reach_band_deg))
         motion = self._begun(start, standing)
-        motion.held_pitch = start.held_pitch
+        motion.held = start.held
         path = self._learned(self._person.approach, point)
         self._go(motion, "carry", point, pitch, path, o.closed_opening, o.clearance, holding=True)
         return self._finished(motion)
@@ -183,7 +186,7 @@ class ServoArmReaching:
         hand = self.arm.position(motion.end)
         if holding:
             below = np.array([*hand[:2], min(hand[2], self.options.table_z + self.options.grasp_height)])
-            self._put(motion, below, self._grasp_pitch(below, here.held_pitch))
+            self._put(motion, below, self._grasp_pitch(below, None if here.held is None else here.held.pitch))
         else:
             self._home(motion, "retreat", hand)
         return self._finished(motion)
@@ -365,7 +368,7 @@ class ServoArmReaching:
         phases = tuple((name, self._period * first) for name, first in motion.phases)
         times: Floats = self._period * np.arange(len(rows), dtype=np.float64)
         hand, holding = self.arm.position(rows), np.concatenate(motion.holding)
-        return PlannedMotion(times, rows, hand, holding, phases, 0.0, motion.held_pitch)
+        return PlannedMotion(times, rows, hand, holding, phases, 0.0, motion.held)
 
     def _learned(self, path: Callable[[Floats], LearnedPath], target: Floats) -> LearnedPath:
         try:
@@ -389,12 +392,24 @@ class ServoArmReaching:
             preferred = self._grasp_pitch(axis + self._usual_reach * ahead, preferred)
         return self._grasp_pitch(source, preferred)
 
-    def _beside(self, position: ArrayLike, gap: float = 0.0) -> Floats:
+    def _held_width(self, width: float | None) -> float:
+        """A width that the gripper holds, m, as measured ones are not exact; raises NoPlanError."""
+        narrowest, widest = self._widths
+        if width is None:
+            return self._usual_width
+        if not narrowest - WIDTH_ERROR_M <= width <= widest + WIDTH_ERROR_M:
+            raise NoPlanError(
+                f"the object looks {1000 * width:.0f} mm wide; this gripper holds objects of {1000 * narrowest:.0f} to "
+                f"{1000 * widest:.0f} mm"
+            )
+        return min(max(width, narrowest), widest)
+
+    def _beside(self, position: ArrayLike, width: float, gap: float = 0.0) -> Floats:
         """The end effector when an object at `position` is so far from the face of a finger that does not move."""
         point = np.asarray(position, dtype=np.float64)
         if self._fixed_finger is None or point.shape != (3,):
             return point
-        aside = self._fixed_finger - np.copysign(self._radius + gap, self._fixed_finger)
+        aside = self._fixed_finger - np.copysign(width / 2 + gap, self._fixed_finger)
         ahead = point[:2] - self._arm.yaw_axis
         left = np.array([-ahead[1], ahead[0], 0.0]) / max(float(np.linalg.norm(ahead)), 1e-9)
         return np.asarray(point - aside * left)
@@ -446,7 +461,7 @@ class MotionRows:
     phases: list[tuple[str, int]] = field(default_factory=list)
     standing: Floats = field(default_factory=lambda: NOTHING)
     in_the_way: set[int] = field(default_factory=set)
-    held_pitch: float | None = None
+    held: Held | None = None
 
     @property
     def end(self) -> Floats:

@@ -7,7 +7,7 @@ from typing import ClassVar as _ClassVar, Mapping as _Mapping, Optional as _Opti
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class Gesture(_message.Message):
-    __slots__ = ("captured", "kind", "object", "u_px", "v_px", "located", "frame", "x", "y", "confidence")
+    __slots__ = ("captured", "kind", "object", "u_px", "v_px", "located", "frame", "x", "y", "confidence", "width_m")
     class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         KIND_UNSPECIFIED: _ClassVar[Gesture.Kind]
@@ -36,6 +36,7 @@ class Gesture(_message.Message):
     X_FIELD_NUMBER: _ClassVar[int]
     Y_FIELD_NUMBER: _ClassVar[int]
     CONFIDENCE_FIELD_NUMBER: _ClassVar[int]
+    WIDTH_M_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     kind: Gesture.Kind
     object: str
@@ -46,4 +47,5 @@ class Gesture(_message.Message):
     x: float
     y: float
     confidence: float
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., kind: _Optional[_Union[Gesture.Kind, str]] = ..., object: _Optional[str] = ..., u_px: _Optional[float] = ..., v_px: _Optional[float] = ..., located: bool = ..., frame: _Optional[str] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., confidence: _Optional[float] = ...) -> None: ...
+    width_m: float
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., kind: _Optional[_Union[Gesture.Kind, str]] = ..., object: _Optional[str] = ..., u_px: _Optional[float] = ..., v_px: _Optional[float] = ..., located: bool = ..., frame: _Optional[str] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., confidence: _Optional[float] = ..., width_m: _Optional[float] = ...) -> None: ...

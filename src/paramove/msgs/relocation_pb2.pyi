@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class RelocationGoal(_message.Message):
-    __slots__ = ("id", "kind", "object", "frame", "to", "attempt", "avoid", "asked_again", "plan_only")
+    __slots__ = ("id", "kind", "object", "frame", "to", "attempt", "avoid", "asked_again", "object_width_m", "plan_only")
     class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         KIND_UNSPECIFIED: _ClassVar[RelocationGoal.Kind]
@@ -36,6 +36,7 @@ class RelocationGoal(_message.Message):
     ATTEMPT_FIELD_NUMBER: _ClassVar[int]
     AVOID_FIELD_NUMBER: _ClassVar[int]
     ASKED_AGAIN_FIELD_NUMBER: _ClassVar[int]
+    OBJECT_WIDTH_M_FIELD_NUMBER: _ClassVar[int]
     PLAN_ONLY_FIELD_NUMBER: _ClassVar[int]
     id: str
     kind: RelocationGoal.Kind
@@ -45,8 +46,9 @@ class RelocationGoal(_message.Message):
     attempt: int
     avoid: _containers.RepeatedCompositeFieldContainer[Position]
     asked_again: bool
+    object_width_m: float
     plan_only: bool
-    def __init__(self, id: _Optional[str] = ..., kind: _Optional[_Union[RelocationGoal.Kind, str]] = ..., object: _Optional[str] = ..., frame: _Optional[str] = ..., to: _Optional[_Union[Position, _Mapping]] = ..., attempt: _Optional[int] = ..., avoid: _Optional[_Iterable[_Union[Position, _Mapping]]] = ..., asked_again: bool = ..., plan_only: bool = ..., **kwargs) -> None: ...
+    def __init__(self, id: _Optional[str] = ..., kind: _Optional[_Union[RelocationGoal.Kind, str]] = ..., object: _Optional[str] = ..., frame: _Optional[str] = ..., to: _Optional[_Union[Position, _Mapping]] = ..., attempt: _Optional[int] = ..., avoid: _Optional[_Iterable[_Union[Position, _Mapping]]] = ..., asked_again: bool = ..., object_width_m: _Optional[float] = ..., plan_only: bool = ..., **kwargs) -> None: ...
 
 class Position(_message.Message):
     __slots__ = ("x", "y", "z")

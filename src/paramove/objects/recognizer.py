@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from paramove.msgs.gesture_pb2 import Gesture
@@ -146,7 +147,16 @@ class Recognizer:
                 self._put_over_opening(gesture, homography)
             gesture.located, gesture.frame = True, homography.plane_frame
             gesture.x, gesture.y = homography.plane_from_image(gesture.u_px, gesture.v_px)
+            gesture.width_m = self._width(gesture, homography)
         return gesture
+
+    def _width(self, gesture: Gesture, homography: PlaneHomography) -> float:
+        """Of an object as it looks where it is, m; 0 if that is not known."""
+        full = self._full_size.expected(gesture.object, gesture.u_px, gesture.v_px)
+        if full is None:
+            return 0.0
+        sides = (gesture.u_px - full.width_px / 2, gesture.u_px + full.width_px / 2)
+        return math.dist(*(homography.plane_from_image(side, gesture.v_px) for side in sides))
 
     def _put_over_opening(self, gesture: Gesture, homography: PlaneHomography) -> None:
         """Moves a gesture over an opening to where an object with its foot in the opening's middle would be detected.
