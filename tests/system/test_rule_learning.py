@@ -24,9 +24,10 @@ def test_robot_learns_the_rules_and_applies_them(launcher):
 def test_a_person_rehearses_with_a_servo_arm_in_real_time(launcher):
     """What the tutorial says to type; nothing of the robot knows that arm and camera are simulated."""
     rehearse, enable = [block.commands[0] for block in blocks(TEACH_RULES) if block.remark == "rehearsed by a test"]
-    running = launcher.start(*rehearse.replace("--view", "--headless").split()[2:])
+    ends = ["--headless", "--set", "simulator.max_duration_s=700"]
+    running = launcher.start(*rehearse.replace("--view", "").split()[2:], *ends)
     heard(running, "paramove arm enable")
-    code, said = at_terminal(enable, "y\n", ENVIRONMENT | launcher.environment)
+    code, said = at_terminal(enable, "y\n", launcher.environment | {"PATH": ENVIRONMENT["PATH"]})
     assert "ARMED" in said, (code, said)
     shown, _ = running.communicate(timeout=900)
     assert running.returncode == 0, shown
