@@ -53,7 +53,7 @@ def offered(monkeypatch, capsys):
     [
         ("paramove la", {"launch"}),
         ("paramove launch ", {"dynamixel_arm", "pointing", "relocate_by_pointing", "rule_learning"}),
-        ("paramove launch rule_learning --with re", {"real", "real_time"}),
+        ("paramove launch rule_learning --with re", {"real", "real_time", "rehearsal"}),
         ("paramove launch pointing --with rep", {"replay"}),
         ("paramove launch rule_learning --set camera.w", {"camera.width="}),
         ("paramove launch rule_learning --set simulator.se", {"simulator.seed="}),
@@ -157,7 +157,7 @@ def test_bash_completes_with_the_installed_script(tmp_path):
         text=True,
         check=False,
     )
-    assert done.stdout.split() == ["real", "real_time"], done.stderr
+    assert done.stdout.split() == ["real", "real_time", "rehearsal"], done.stderr
 
 
 def test_the_command_that_is_typed_is_found():
