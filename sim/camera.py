@@ -35,6 +35,9 @@ class Eye:
 
     Raises:
         GraphicsError: MuJoCo finds no way to render.
+
+    Attributes:
+        options: What of the model is drawn.
     """
 
     def __init__(self, model: mujoco.MjModel, width_px: int, height_px: int) -> None:
@@ -55,7 +58,7 @@ class Eye:
         self._scene = mujoco.MjvScene(model, maxgeom=500)
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._scene.flags[flag] = 0
-        self._options = mujoco.MjvOption()
+        self.options = mujoco.MjvOption()
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
         self._upside_down = np.empty((height_px, width_px, 3), dtype=np.uint8)
@@ -68,7 +71,7 @@ class Eye:
         self._gl.make_current()
         self._camera.fixedcamid = self._model.camera(camera).id
         every = mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(self._model, data, self._options, None, self._camera, every, self._scene)
+        mujoco.mjv_updateScene(self._model, data, self.options, None, self._camera, every, self._scene)
         adorn(self._scene)
         port = mujoco.MjrRect(0, 0, *self._size)
         mujoco.mjr_render(port, self._scene, self._context)
@@ -152,8 +155,8 @@ class ViewForPeople:
     def __init__(self, model: mujoco.MjModel, person: DrawnPerson | None = None) -> None:
         self._eye = Eye(model, *scene.VIEW_PX)
         self._person = person
-        self._hand = int(model.body_mocapid[model.body(scene.HAND).id])
-        self._sleeve = model.geom("hand_sleeve").id
+        if person is not None:  # who has sleeves
+            self._eye.options.geomgroup[scene.SLEEVE_GROUP] = 0
         self.close = self._eye.close
 
     def images(self, data: mujoco.MjData, tick: int, now_ns: int) -> Iterator[tuple[Topic, RawImage]]:
@@ -162,14 +165,9 @@ class ViewForPeople:
         def adorn(drawn: mujoco.MjvScene) -> None:
             for light in drawn.lights[: drawn.nlight]:
                 light.diffuse[:], light.ambient[:] = VIEW_DIFFUSE, VIEW_AMBIENT
-            if self._person is None:
-                return
-            for geom in drawn.geoms[: drawn.ngeom]:
-                if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid == self._sleeve:
-                    geom.rgba[3] = 0.0  # the drawn arm has its own
-            turn = np.zeros(9)
-            mujoco.mju_quat2Mat(turn, data.mocap_quat[self._hand])
-            self._person.draw(drawn, data.mocap_pos[self._hand], turn.reshape(3, 3)[:, 2])
+            if self._person is not None:
+                hand = data.body(scene.HAND)
+                self._person.draw(drawn, hand.xpos, hand.xmat.reshape(3, 3)[:, 2])
 
         yield topics.TRUTH_VIEW, raw_image(self._eye.look(data, "view", adorn), "view", now_ns)
 

@@ -13,8 +13,12 @@ ACROSS = np.array((0.27, -0.96, 0.0))
 """From that shoulder to the other one, unit vector."""
 SHOULDERS_M, UPPER_ARM_M, FOREARM_M = 0.36, 0.29, 0.27
 WRIST_M = 0.135  # from the fingertip, where the simulated hand ends
-SKIN, SHIRT, TROUSERS, HAIR = (0.87, 0.68, 0.56), (0.28, 0.42, 0.60), (0.22, 0.24, 0.29), (0.25, 0.18, 0.13)
+Colour = tuple[float, float, float]
+SKIN, HAIR, EYES = (0.87, 0.68, 0.56), (0.25, 0.18, 0.13), (0.08, 0.08, 0.10)
+SHIRT, TROUSERS = (0.28, 0.42, 0.60), (0.22, 0.24, 0.29)
 _UP = np.array((0.0, 0.0, 1.0))
+_FACING = np.cross(ACROSS, _UP)
+_TURN = np.column_stack((_FACING, ACROSS, _UP)).ravel()
 
 
 class DrawnPerson:
@@ -26,56 +30,49 @@ class DrawnPerson:
 
     def __init__(self, origin: Floats) -> None:
         self._shoulder = origin + SHOULDER
-        self._scene: mujoco.MjvScene | None = None
 
     def draw(self, scene: mujoco.MjvScene, fingertip: Floats, backward: Floats) -> None:
         """Around a hand, of which fingertip and the direction from there to the wrist are given, [3] each, world."""
-        self._scene = scene
         shoulder, other = self._shoulder, self._shoulder + SHOULDERS_M * ACROSS
         middle = (shoulder + other) / 2
-        self._capsule(shoulder, other, 0.062, SHIRT)
-        self._ellipsoid(middle - 0.20 * _UP, (0.115, 0.175, 0.24), SHIRT)
-        hips = middle - 0.46 * _UP
-        self._capsule(hips - 0.11 * ACROSS, hips + 0.11 * ACROSS, 0.10, TROUSERS)
-        self._capsule(middle, middle + 0.12 * _UP, 0.046, SKIN)
-        head = middle + 0.21 * _UP
-        facing = np.cross(ACROSS, _UP)
-        self._ellipsoid(head, (0.086, 0.074, 0.108), SKIN)
-        self._ellipsoid(head + 0.030 * _UP - 0.016 * facing, (0.088, 0.080, 0.092), HAIR)
+        hips, head = middle - 0.46 * _UP, middle + 0.21 * _UP
+        _capsule(scene, shoulder, other, 0.062, SHIRT)
+        _ellipsoid(scene, middle - 0.20 * _UP, (0.115, 0.175, 0.24), SHIRT)
+        _capsule(scene, hips - 0.11 * ACROSS, hips + 0.11 * ACROSS, 0.10, TROUSERS)
+        _capsule(scene, middle, middle + 0.12 * _UP, 0.046, SKIN)
+        _ellipsoid(scene, head, (0.086, 0.074, 0.108), SKIN)
+        _ellipsoid(scene, head + 0.030 * _UP - 0.016 * _FACING, (0.088, 0.080, 0.092), HAIR)
         for side in (-0.03, 0.03):
-            self._ellipsoid(
-                head + 0.076 * facing + side * ACROSS + 0.008 * _UP, (0.011, 0.011, 0.011), (0.08, 0.08, 0.1)
-            )
-        wrist = fingertip + WRIST_M * backward
-        elbow = elbow_of(shoulder, wrist)
-        self._arm(shoulder, elbow, wrist)
+            _ellipsoid(scene, head + 0.076 * _FACING + side * ACROSS + 0.008 * _UP, (0.011,) * 3, EYES)
         resting = other + np.array((-0.24, -0.02, -0.36))
-        self._arm(other, elbow_of(other, resting), resting)
-        self._ellipsoid(resting - np.array((0.03, 0.0, 0.0)), (0.05, 0.035, 0.022), SKIN)
+        _arm(scene, shoulder, fingertip + WRIST_M * backward)
+        _arm(scene, other, resting)
+        _ellipsoid(scene, resting - np.array((0.03, 0.0, 0.0)), (0.05, 0.035, 0.022), SKIN)
 
-    def _arm(self, shoulder: Floats, elbow: Floats, wrist: Floats) -> None:
-        cuff = elbow + 0.8 * (wrist - elbow)
-        self._capsule(shoulder, elbow, 0.046, SHIRT)
-        self._capsule(elbow, cuff, 0.037, SHIRT)
-        self._capsule(cuff, wrist, 0.024, SKIN)
 
-    def _capsule(self, start: Floats, end: Floats, radius: float, colour: tuple[float, float, float]) -> None:
-        geom = self._next(mujoco.mjtGeom.mjGEOM_CAPSULE, np.zeros(3), colour)
-        mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_CAPSULE, radius, np.asarray(start), np.asarray(end))
+def _arm(scene: mujoco.MjvScene, shoulder: Floats, wrist: Floats) -> None:
+    elbow = elbow_of(shoulder, wrist)
+    cuff = elbow + 0.8 * (wrist - elbow)
+    _capsule(scene, shoulder, elbow, 0.046, SHIRT)
+    _capsule(scene, elbow, cuff, 0.037, SHIRT)
+    _capsule(scene, cuff, wrist, 0.024, SKIN)
 
-    def _ellipsoid(self, centre: Floats, size: tuple[float, float, float], colour: tuple[float, float, float]) -> None:
-        geom = self._next(mujoco.mjtGeom.mjGEOM_ELLIPSOID, np.asarray(centre), colour)
-        geom.size[:] = size
 
-    def _next(self, kind: mujoco.mjtGeom, centre: Floats, colour: tuple[float, float, float]) -> mujoco.MjvGeom:
-        scene = self._scene
-        assert scene is not None
-        geom = scene.geoms[scene.ngeom]
-        facing = np.cross(ACROSS, _UP)
-        turned = np.column_stack((facing, ACROSS, _UP))
-        mujoco.mjv_initGeom(geom, kind, np.ones(3), centre, turned.ravel(), np.array((*colour, 1.0), dtype=np.float32))
-        scene.ngeom += 1
-        return geom
+def _capsule(scene: mujoco.MjvScene, start: Floats, end: Floats, radius: float, colour: Colour) -> None:
+    geom = _geom(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, np.ones(3), np.zeros(3), colour)
+    mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_CAPSULE, radius, start, end)
+
+
+def _ellipsoid(scene: mujoco.MjvScene, centre: Floats, size: tuple[float, ...], colour: Colour) -> None:
+    _geom(scene, mujoco.mjtGeom.mjGEOM_ELLIPSOID, np.array(size), centre, colour)
+
+
+def _geom(scene: mujoco.MjvScene, kind: mujoco.mjtGeom, size: Floats, centre: Floats, colour: Colour) -> mujoco.MjvGeom:
+    """One more geom of a scene."""
+    geom = scene.geoms[scene.ngeom]
+    mujoco.mjv_initGeom(geom, kind, size, centre, _TURN, np.array((*colour, 1.0), dtype=np.float32))
+    scene.ngeom += 1
+    return geom
 
 
 def elbow_of(shoulder: Floats, wrist: Floats) -> Floats:

@@ -8,13 +8,11 @@ import socket
 from collections.abc import Iterator
 from pathlib import Path
 
-import cv2
 import mujoco
-import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.bus import Topic
-from paramove.cameras import framed, short_name
+from paramove.cameras import Frame, encode, framed, image_of_raw, short_name
 from sim.camera import ImageSource
 
 JPEG_QUALITY = 95
@@ -59,11 +57,8 @@ class OfferedCamera:
     def _send(self, image: RawImage) -> None:
         if self._client is None or not select.select([], [self._client], [], 0.0)[1]:
             return
-        pixels = np.frombuffer(image.data, dtype=np.uint8).reshape(image.height, image.width, 3)
-        bgr = cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR)
-        _, encoded = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
         try:
-            self._client.sendall(framed(encoded.tobytes()))
+            self._client.sendall(framed(encode(Frame(image_of_raw(image), 0, 0), JPEG_QUALITY).data))
         except OSError:  # gone, or too slow for half an image
             self._disconnect()
 

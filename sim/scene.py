@@ -44,6 +44,8 @@ FAR_EDGE = 0.60
 HAND = "person_hand"
 """Body of the person's hand; robots have hands, too."""
 HIDDEN_GROUP = 3
+SLEEVE_GROUP = 1
+"""Of the sleeve of a person of whom one sees a hand alone."""
 MARGIN_SHARE = 16 / 240  # rendered beyond each border, which the lens may pull in
 RENDERED_PX = (
     looks.WIDTH_PX + 2 * round(looks.WIDTH_PX / 2 * MARGIN_SHARE),
@@ -283,6 +285,7 @@ def _add_hand(spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
             fromto=(*start, *end),
             size=(radius, 0.0, 0.0),
             rgba=RGBA[look],
+            group=SLEEVE_GROUP if name == "sleeve" else 0,
             **looks_only,
         )
     body.add_geom(

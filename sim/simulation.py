@@ -124,13 +124,13 @@ class Simulation:
         self.write_measures = write_measures
         self.physics_s = self.rendering_s = 0.0
         lock = robot.connect(world, self._step)
-        self._in_real_time, self._lock = lock is not None, lock or contextlib.nullcontext()
-        self._copy = mujoco.MjData(world.model)
+        self._lock = lock or contextlib.nullcontext()
+        self._copy = None if lock is None else mujoco.MjData(world.model)  # rendered while the world runs on
 
     @property
     def now_ns(self) -> int:
         """Simulated time since the start, or monotonic time of a world that runs by itself."""
-        return time.monotonic_ns() if self._in_real_time else self.world.steps * 1_000_000
+        return self.world.steps * 1_000_000 if self._copy is None else time.monotonic_ns()
 
     @property
     def tick(self) -> int:
@@ -172,7 +172,7 @@ class Simulation:
             ]
             if person.arm is not None:
                 others.append((topics.TRUTH_ARM, truth.arm(now_ns, person.arm)))
-            if self._in_real_time:
+            if self._copy is not None:
                 mujoco.mj_copyData(self._copy, world.model, data)
                 data = self._copy
         images = [image for camera in self._cameras for image in camera.images(data, tick, now_ns)]

@@ -32,14 +32,13 @@ class ArmWatch:
             self._waits_s = None
         elif self._waits_s is None:
             self._waits_s = now_s
+        why = "; ".join(fault.detail for fault in message.faults)
         if not self._was_armed or message.state in _AT_WORK:
-            self._lost_s = None
-            self._why = "; ".join(fault.detail for fault in message.faults)
-            return
-        self._why = "; ".join(fault.detail for fault in message.faults) or self._why
-        if self._lost_s is None:
-            self._lost_s = now_s
-            self._why = "; ".join(fault.detail for fault in message.faults)
+            self._lost_s, self._why = None, why
+        elif self._lost_s is None:
+            self._lost_s, self._why = now_s, why
+        else:
+            self._why = why or self._why
 
     @property
     def lost(self) -> bool:

@@ -35,6 +35,7 @@ from .frames import FrameChecks as FrameChecks
 from .frames import FrameError as FrameError
 from .frames import decode as decode
 from .frames import encode as encode
+from .frames import image_of_raw as image_of_raw
 from .placement import Placement as Placement
 from .placement import board_depth as board_depth
 from .placement import place_camera as place_camera

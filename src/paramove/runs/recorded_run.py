@@ -131,6 +131,10 @@ class RecordedRun:
         """Capture time of a message."""
         return float(1e-9 * (message.captured.ToNanoseconds() - self.begun_ns))
 
+    def recording(self, name: str) -> PartedRecording:
+        """Its `recording` or `truth`, to be read again for what is not in `messages`."""
+        return recording_in(self.folder, f"{name}.mcap", self.begun_ns)
+
     def received(self, topic: topics.Topic) -> list[Recorded]:
         """Messages of a topic, in order."""
         return self.messages.get(topic.name, [])

@@ -16,7 +16,7 @@ from paramove.cameras import Frame, decode, encode
 from paramove.documents import film, image, report_page, section
 from paramove.runs import plots
 from paramove.runs.pointing.video import drawn
-from paramove.runs.recorded_run import RecordedRun, recording_in
+from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.relocate_by_pointing.run import GOAL, SCALE, PointedRelocation
 
 TRUE, ENDED = "#1d2530", "#d9a400"
@@ -112,15 +112,14 @@ def _table(summary: dict[str, Any]) -> str:
 def _pictures(run: RecordedRun, relocations: list[PointedRelocation]) -> dict[int, bytes]:
     """Number of a relocation -> the first camera's image when the target was recognised, with the ball, JPEG."""
     outlines = {
-        recorded.log_ns: recorded.message
-        for recorded in recording_in(run.folder, "recording.mcap").read({topics.ACTION_OUTLINE.name})
+        recorded.log_ns: recorded.message for recorded in run.recording("recording").read({topics.ACTION_OUTLINE.name})
     }
     times = np.array(sorted(outlines)) if outlines else np.empty(0)
     needed = {
         int(times[np.abs(times - 1e9 * one.recognised_s).argmin()]): one.number for one in relocations if len(times)
     }
     pictures = {}
-    for recorded in recording_in(run.folder, "recording.mcap").read({CAMERA}):
+    for recorded in run.recording("recording").read({CAMERA}):
         if recorded.log_ns in needed:
             picture = drawn(decode(recorded.message), outlines[recorded.log_ns], "", PICTURE_PX)
             pixels = np.ascontiguousarray(picture[:, :, ::-1])

@@ -12,7 +12,7 @@ from paramove.documents import Floats
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.rule_pb2 import Speech
-from paramove.runs.recorded_run import RecordedRun, RunFolderError, recording_in
+from paramove.runs.recorded_run import RecordedRun, RunFolderError
 from paramove.runs.relocations import Relocation, relocations_of
 
 SCALE = 0.42
@@ -196,12 +196,13 @@ def _arrivals(run: RecordedRun) -> list[tuple[float, Floats]]:
         raise RunFolderError(f"{run.folder}: the truth has no position of the person's table (world_from_table)")
     world_from_table = np.array(layout.world_from_table).reshape(4, 4)
     arrivals: dict[int, tuple[float, Floats]] = {}
-    for recorded in recording_in(run.folder, "truth.mcap").read({topics.TRUTH_ARM.name}):
+    for recorded in run.recording("truth").read({topics.TRUTH_ARM.name}):
         arm = recorded.message
-        if arm.at_target and arm.performance not in arrivals and arm.time_ns * 1e-9 <= run.end_s:
+        time_s = 1e-9 * (arm.time_ns - run.begun_ns)
+        if arm.at_target and arm.performance not in arrivals and time_s <= run.end_s:
             in_table = np.array([arm.target.x, arm.target.y, arm.target.z, 1.0])
             in_shoulder = (world_from_table @ in_table)[:3] - run.truth.shoulder
-            arrivals[arm.performance] = (arm.time_ns * 1e-9, in_shoulder[:2])
+            arrivals[arm.performance] = (time_s, in_shoulder[:2])
     return list(arrivals.values())
 
 

@@ -16,7 +16,7 @@ from paramove.bus import topics
 from paramove.cameras import decode
 from paramove.documents import Image, replacing
 from paramove.runs.pointing.video import drawn
-from paramove.runs.recorded_run import RecordedRun, recording_in
+from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.rule_learning.video_frame import (
     ACCENT,
     BACK,
@@ -41,7 +41,7 @@ CAMERA = topics.CAMERA_IMAGES[0].name
 
 def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
     """Write `relocations.mp4` into the run's folder; None if no view was recorded (headless). Raises VideoError."""
-    views = sum(1 for _ in recording_in(run.folder, "truth.mcap").read({topics.TRUTH_VIEW.name}))
+    views = sum(1 for _ in run.recording("truth").read({topics.TRUTH_VIEW.name}))
     if not views:
         return None
     speech = [(r.publish_ns, r.message.text) for r in run.received(topics.SPEECH)]
@@ -50,7 +50,7 @@ def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
     title = f"relocation by pointing, seed {run.truth.layout.seed}"
     with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
         picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
-        frames = track(_frames(run.folder), "video", views // EVERY, console=console, transient=True)
+        frames = track(_frames(run), "video", views // EVERY, console=console, transient=True)
         for time_ns, camera, outline, view in frames:
             picture = composed(camera, outline, view)
             paste(picture, label(title, 20, TEXT, bold=True), 16, 12)
@@ -77,13 +77,13 @@ def composed(camera_bgr: Image, outline: Any | None, view: Image) -> Image:
     return frame
 
 
-def _frames(folder: Path) -> Iterator[tuple[int, Image, Any | None, Image]]:
+def _frames(run: RecordedRun) -> Iterator[tuple[int, Image, Any | None, Image]]:
     """Time, image BGR and its annotations, and the view RGB, of every so-many-th view."""
     needed = {CAMERA, topics.ACTION_OUTLINE.name}
     outlines: dict[int, Any] = {}
-    recorded_images = recording_in(folder, "recording.mcap").read(needed)
+    recorded_images = run.recording("recording").read(needed)
     image, following = None, next(recorded_images, None)
-    for index, view in enumerate(recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name})):
+    for index, view in enumerate(run.recording("truth").read({topics.TRUTH_VIEW.name})):
         while following is not None and following.publish_ns <= view.publish_ns:
             if following.topic == CAMERA:
                 image = following

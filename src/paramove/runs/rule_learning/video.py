@@ -12,7 +12,7 @@ from rich.progress import track
 
 from paramove.bus import topics
 from paramove.documents import Image, InputError, decoded, replacing
-from paramove.runs.recorded_run import RecordedRun, recording_in
+from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.rule_learning.story import Story
 from paramove.runs.rule_learning.summary import RunEvaluation
 from paramove.runs.rule_learning.video_frame import SIZE, VideoFrame
@@ -56,15 +56,15 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
 
 def view_times(run: RecordedRun) -> Iterator[float]:
     """Times of the recorded views, s."""
-    for recorded in recording_in(run.folder, "truth.mcap", run.begun_ns).read({topics.TRUTH_VIEW.name}):
+    for recorded in run.recording("truth").read({topics.TRUTH_VIEW.name}):
         yield recorded.log_ns * 1e-9
 
 
 def paired_images(run: RecordedRun, every: int) -> Iterator[tuple[float, Image, Image]]:
     """Time, camera image and view, RGB, of every so-many-th view; the camera's image is the latest one by then."""
-    cameras = recording_in(run.folder, "recording.mcap", run.begun_ns).read({topics.CAMERA_IMAGE.name})
+    cameras = run.recording("recording").read({topics.CAMERA_IMAGE.name})
     latest, following = None, next(cameras, None)
-    views = recording_in(run.folder, "truth.mcap", run.begun_ns).read({topics.TRUTH_VIEW.name})
+    views = run.recording("truth").read({topics.TRUTH_VIEW.name})
     for index, view in enumerate(views):
         while following is not None and following.log_ns <= view.log_ns:
             latest, following = following, next(cameras, None)
