@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from paramove.documents import DocumentError
 from paramove.supervision import application
 from paramove.supervision.launch_file import load
 from paramove.workspace import Workspace
@@ -50,3 +51,12 @@ def test_seed_goes_to_the_simulator_alone():
     launch = load(Workspace.at(ROOT), "rule_learning", ["sim"], seed=4711)
     seeded = [name for name, node in launch.file.nodes.items() if node.parameters.get("seed") == 4711]
     assert seeded == ["simulator"]
+
+
+@pytest.mark.parametrize("name", ["rule_learning", "relocate_by_pointing"])
+def test_every_described_robot_can_be_named(name):
+    workspace = Workspace.at(ROOT)
+    for robot in workspace.robots():
+        application.check(load(workspace, name, robot=robot), workspace)
+    with pytest.raises(DocumentError, match="koch_v1_1, open_manipulator_x"):
+        application.check(load(workspace, name, robot="koch_v2"), workspace)
