@@ -28,6 +28,7 @@ from rich.console import Console
 from rich.progress import track
 
 from paramove.cameras import Frame, decode, encode
+from paramove.diagnosis import Eye
 from paramove.documents import Floats
 from paramove.motion import MotionPlans, MovementSource, NoPlanError, SurfaceParameters, plans_for
 from paramove.msgs.gesture_pb2 import Gesture
@@ -37,7 +38,7 @@ from paramove.objects import ColourTracker, PlaneHomography, Recognizer
 from paramove.robots import RobotDescription
 from paramove.runs import seeds_of
 from sim import looks, places, scene, tool_box
-from sim.camera import Eye, Sensor
+from sim.camera import Sensor
 from sim.hand import FROM_ABOVE
 from sim.hand_path import minimum_jerk
 from sim.instructor import SHOWN_LIFT

@@ -13,8 +13,9 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.bus import Topic, topics
 from paramove.cameras import CalibratedCamera
+from paramove.diagnosis import Eye
 from paramove.documents import Floats
-from sim.camera import Eye, raw_image, with_noise
+from sim.camera import raw_image, with_noise
 from sim.human import camera_frame
 from sim.performances import Lens
 from sim.performances_scene import (

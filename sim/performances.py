@@ -21,9 +21,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from paramove.cameras import CalibratedCamera
 from paramove.demonstrations import RESTING_STERNUM, SAMPLE_RATE_HZ, RecordingsError
+from paramove.diagnosis import Eye
 from paramove.documents import Floats, Image, InputError
 from sim.body_markers import place_markers
-from sim.camera import Eye
 from sim.human import place_arm, place_torso
 from sim.performances_scene import MARGIN_PX, Room, as_calibrated, build, draw_cameras, rendered_px
 from sim.persons.clips import (

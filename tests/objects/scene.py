@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.diagnosis import graphics_backend
 from paramove.documents.array_types import Floats
-from sim.camera import graphics_backend
 
 COLOURS = {"yellow": "0.90 0.78 0.05 1", "green": "0.08 0.60 0.15 1", "blue": "0.08 0.18 0.75 1"}
 WORKING_AREA = ((0.12, -0.12), (0.19, -0.12), (0.19, 0.08), (0.12, 0.08))
@@ -166,7 +166,7 @@ class Scene:
         return np.array([self.focal_px * x * scale + 239.5, self.focal_px * y * scale + 179.5])
 
     def _open_renderer(self) -> None:
-        """As `sim.camera.Eye`: mujoco.Renderer depends on MUJOCO_GL at the first import of mujoco in the tests."""
+        """As `Eye`: mujoco.Renderer depends on MUJOCO_GL at the first import of mujoco in the tests."""
         self._gl = import_module(f"mujoco.{graphics_backend()}").GLContext(480 + 2 * MARGIN, 360 + 2 * MARGIN)
         self._gl.make_current()
         self._scene = mujoco.MjvScene(self._model, maxgeom=100)

@@ -5,8 +5,8 @@ import mujoco
 import numpy as np
 
 from paramove.demonstrations import RESTING_SHOULDER
+from paramove.diagnosis import Eye
 from paramove.observation import ArmSizes, fitted_poses
-from sim.camera import Eye
 from sim.human import PersonLook, add_person, camera_frame, place_arm
 
 

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from paramove.diagnosis import Eye
 from paramove.observation import ArmSizes
-from sim.camera import Eye
 from sim.human import add_arm, camera_frame, place_arm
 
 

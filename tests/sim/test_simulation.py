@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 from paramove.bus import topics
 from paramove.bus.subscriber import Received
+from paramove.diagnosis import Eye, GraphicsError
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.rule_pb2 import Speech
 from paramove.objects.colour_tracker import ColourTracker
@@ -17,7 +18,6 @@ from paramove.robots.description import RobotDescription
 from paramove.robots.hoap3.wire import batch_message
 from paramove.robots.streaming.stream import StreamWriter
 from sim import looks, tool_box
-from sim.camera import Eye, GraphicsError
 from sim.simulation import Simulation, step_of_tick
 from sim.world import OPENINGS_UP, World
 from tests.sim.conftest import simulated
@@ -125,7 +125,7 @@ def test_view_is_another_picture(seeing: Simulation) -> None:
 
 
 def test_missing_graphics_are_named_with_what_would_work(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sim.camera.graphics_backend", lambda: "no_such_backend")
+    monkeypatch.setattr("paramove.diagnosis.rendering.graphics_backend", lambda: "no_such_backend")
     with pytest.raises(GraphicsError, match=r"MUJOCO_GL=egl.*camera: false"):
         Eye(world.model, 64, 48)
 

@@ -5,3 +5,5 @@ from .finding import Level as Level
 from .finding import Machine as Machine
 from .finding import Part as Part
 from .graphics import graphics_backend as graphics_backend
+from .rendering import Eye as Eye
+from .rendering import GraphicsError as GraphicsError

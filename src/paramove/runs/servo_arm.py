@@ -1,7 +1,8 @@
-"""Evaluates a run of a servo arm's tasks: `run.json` and `tasks.png` in its folder.
+"""Evaluates a run of a servo arm's tasks: `run.json`, `report.html`, `tasks.png` and `tasks.mp4` in its folder.
 
-Called by the launcher after the run, or by hand: `python -m paramove.runs.servo_arm RUN_FOLDER`. Exit codes: 0
-the arm reached every target and put every object where it belongs, by the recorded truth; 3 it did not; 66 no such run.
+Called by the launcher after the run, or by hand: `python -m paramove.runs.servo_arm RUN_FOLDER [--no-video]`.
+Exit codes: 0 the arm reached every target and put every object where it belongs, by the recorded truth; 3 it did not;
+66 no such run.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ import numpy as np
 from rich.console import Console
 
 from paramove.bus import topics
-from paramove.documents import Floats, InputError, read_document
+from paramove.documents import Floats, InputError, film, image, read_document, report_page, section, table
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording import PartedRecording
+from paramove.robots import RobotDescription
 from paramove.runs.after_a_run import evaluated, write_run_json
 from paramove.runs.recorded_run import RunFolderError
 
@@ -88,8 +90,12 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
         what = f"{one.thing or 'hand'} to {_metres(one.wanted)}"
         mark = "" if one.good else "  <- too far"
         console.print(f"  {one.task:6} {what:40} {1e3 * one.error:5.1f} mm away{mark}")
+    from paramove.runs.servo_arm_film import write_film
+
     picture = _draw(folder / "tasks.png", results, states)
-    for path in (picture, numbers):
+    video = None if options.no_video else write_film(folder, _robot_of(folder), states, console)
+    report = _write_report(folder, results, picture, video)
+    for path in (report, picture, *([] if video is None else [video]), numbers):
         console.print(f"{path.name:16s} {path}", markup=False, soft_wrap=True)
     return success
 
@@ -113,6 +119,39 @@ def _tasks_in(folder: Path) -> list[dict[str, Any]]:
         return list(read_document(path, "configuration of a node").data["parameters"]["tasks"])
     except (InputError, KeyError, TypeError) as error:
         raise RunFolderError(f"{path} has no tasks of the run ({error!r})") from error
+
+
+def _robot_of(folder: Path) -> RobotDescription:
+    path = folder / "nodes" / "arm_driver.yaml"
+    try:
+        return RobotDescription.load(Path(read_document(path, "configuration of a node").data["parameters"]["robot"]))
+    except (InputError, KeyError, TypeError) as error:
+        raise RunFolderError(f"{path} names no robot ({error!r})") from error
+
+
+def _write_report(folder: Path, results: Sequence[TaskResult], picture: Path, video: Path | None) -> Path:
+    good = sum(one.good for one in results)
+    rows = [
+        [one.task, one.thing or "hand", _metres(one.wanted), _metres(one.found), f"{1e3 * one.error:.1f}",
+         "good" if one.good else "too far"]
+        for one in results
+    ]  # fmt: skip
+    title = "Tasks of a servo arm"
+    parts = [
+        film(video),
+        section(
+            "Numbers", f"A hand within {1e3 * REACHED_M:.0f} mm of its target and an object within "
+            f"{1e3 * PLACED_M:.0f} mm count as there.",
+            table(["task", "what", "wanted", "found", "error, mm", ""], rows, numbers=(4,)),
+        ),
+        section("Paths", "Crosses are targets.", image(picture.read_bytes(), "paths of the hand and the objects")),
+    ]  # fmt: skip
+    path = folder / "report.html"
+    page = report_page(
+        title, title, f"{good} of {len(results)} tasks done", parts, good=good == len(results), style="img{width:100%}"
+    )
+    path.write_text(page, encoding="utf-8")
+    return path
 
 
 def _places(state: TruthState) -> dict[str, Floats]:
