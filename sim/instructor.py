@@ -12,6 +12,7 @@ from sim import places, tool_box
 from sim.arm import Arm
 from sim.hand import Hand, Script, Step, tip_over
 from sim.hand_path import minimum_jerk
+from sim.mishaps import Mishaps
 from sim.person import Person
 from sim.sights import Sights, Table
 from sim.small_person import POINTED_ABOVE_PLANE, SmallPerson
@@ -34,6 +35,7 @@ class Instructor(Person):
         draws: Generators for `places`, `order`, `paths`.
         body: Whose arm moves with the hand, and points as people do; None: a hand alone, which points from nearby.
         pointing: Of how that arm points each time.
+        mishaps: What goes wrong; None: nothing.
 
     Attributes:
         pointed_at: Colour that is being pointed at, or was last.
@@ -47,6 +49,7 @@ class Instructor(Person):
         draws: dict[str, np.random.Generator],
         body: SmallPerson | None = None,
         pointing: np.random.Generator | None = None,
+        mishaps: Mishaps | None = None,
     ) -> None:
         openings = {item.name: item for item in tool_box.OPENINGS}
         self._opening = {colour: openings[name] for colour, name in rules.items()}
@@ -54,6 +57,7 @@ class Instructor(Person):
         self._places, self._order, self._paths = draws["places"], draws["order"], draws["paths"]
         hand = Hand(table, self._sees, self._paths)
         super().__init__(table, hand, Arm(hand, body, pointing) if body is not None and pointing is not None else None)
+        self._mishaps = mishaps
         self._to_point: list[str] = []
         self.pointed_at = ""
         self.arranged = False
@@ -85,6 +89,7 @@ class Instructor(Person):
     # -- scripts ----------------------------------------------------------------------------------------------------
 
     def _hand_over(self, name: str) -> Script:
+        yield from self._clear_the_box()
         held = self.table.held_by_instructor
         if held is None:
             held = name or self._to_hand_over()
@@ -98,9 +103,11 @@ class Instructor(Person):
         yield self.hand.move(self._into_hand(0.0), seconds=(1.0, 1.5), straight=True)
 
     def _stand_at_start(self, _: str) -> Script:
+        yield from self._clear_the_box()
         name = self._to_hand_over()
         self.doing = f"stands {name} at the mark"
-        yield from self.hand.bring(name, np.array(places.START))
+        moved = np.zeros(3) if self._mishaps is None else self._mishaps.base_moved
+        yield from self.hand.bring(name, np.array(places.START) + moved[:2])
         yield from self.withdraw()
 
     def _let_go(self, _: str) -> Script:
@@ -111,10 +118,7 @@ class Instructor(Person):
         yield from self.withdraw()
 
     def _show_rules(self, _: str) -> Script:
-        yield from self.empty_hand()
-        for colour in tool_box.COLOURS:
-            if not self._sees.is_parked(colour):
-                yield from self._take_away(colour)
+        yield from self._take_all_away()
         yield from self._turn_box()
         for place in self._order.permutation(len(tool_box.COLOURS)):
             yield from self._show(tool_box.COLOURS[place])
@@ -123,7 +127,8 @@ class Instructor(Person):
         yield from self.empty_hand()
         if name not in self._opening:
             return
-        yield from self._turn_box()
+        if not self.table.openings_up():
+            yield from self._turn_box()
         yield from self._show(name)
 
     def _point(self, requested: str) -> Script:
@@ -136,6 +141,8 @@ class Instructor(Person):
             self.doing = "sees nothing left to do"
             yield Step(1.0)
             return
+        if self._mishaps is not None:
+            yield from self._mishaps.strike(name, self.hand)
         self.doing, self.pointed_at = f"points at {name}", name
         if self.arm is None:
             yield from self._point_from_nearby(name)
@@ -143,6 +150,8 @@ class Instructor(Person):
             x, y, _ = self.table.position(name)
             yield from self.arm.point_at((x, y, tool_box.SURFACE_Z + POINTED_ABOVE_PLANE))
             self.arm.follow_hand()
+        if self._mishaps is not None:
+            yield Step(self._mishaps.lingers_s)
         yield from self.withdraw()
 
     def _point_from_nearby(self, name: str) -> Script:
@@ -163,7 +172,10 @@ class Instructor(Person):
         others = [
             self.table.position(other)[:2] for other in tool_box.COLOURS if other != name and self._sees.stands(other)
         ]
-        yield from self.hand.bring(name, places.draw_place(self._places, others))
+        yield from self.hand.pick_up(name)
+        if self._mishaps is not None:
+            self._mishaps.mend()
+        yield from self.hand.stand_at(tool_box.standing_centre(*places.draw_place(self._places, others)))
         yield from self.withdraw()
 
     # -- parts of scripts -------------------------------------------------------------------------------------------
@@ -202,19 +214,32 @@ class Instructor(Person):
         yield from self.hand.pick_up(name)
         yield from self.hand.park(name)
 
-    def _turn_box(self) -> Script:
+    def _take_all_away(self) -> Script:
+        yield from self.empty_hand()
+        for colour in tool_box.COLOURS:
+            if not self._sees.is_parked(colour):
+                yield from self._take_away(colour)
+
+    def _clear_the_box(self) -> Script:
+        """The robot calibrates again."""
         if self.table.openings_up():
-            return
+            yield from self._take_all_away()
+            yield from self._turn_box()
+            self.arranged = False
+
+    def _turn_box(self) -> Script:
         self.doing = "turns the box"
         front = np.array((tool_box.X_RANGE[1], tool_box.CENTRE[1], tool_box.CENTRE[2]))  # on the axis of the turn
         yield self.hand.move(front, np.array((0.8, -0.4, 0.4)), (1.2, 1.6))
-        yield Step(3.2, during=lambda time_s: self._carry_box(front, time_s / 3.2))
+        up = self.table.openings_up()
+        yield Step(3.2, during=lambda time_s: self._carry_box(front, time_s / 3.2, up))
         yield from self.withdraw()
 
-    def _carry_box(self, front: Floats, phase: float) -> None:
+    def _carry_box(self, front: Floats, phase: float, openings_up: bool) -> None:
         away = minimum_jerk(phase / 0.35) - minimum_jerk((phase - 0.65) / 0.35)
         up = minimum_jerk((phase - 0.15) / 0.25) - minimum_jerk((phase - 0.60) / 0.25)
-        angle = np.pi * (1 - minimum_jerk((phase - 0.30) / 0.40))
+        turned = minimum_jerk((phase - 0.30) / 0.40)
+        angle = np.pi * (turned if openings_up else 1 - turned)
         offset = np.array((BOX_PULLED * away, 0.0, BOX_LIFTED * up))
         self.table.move_box(offset, (np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0))
         self.hand.place(front + offset, self.hand.backward)

@@ -5,7 +5,7 @@ World frame: the torso frame of the robot's model. The files of the robot are ta
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import mujoco
@@ -62,7 +62,9 @@ Furnish = Callable[[mujoco.MjSpec, Floats], None]
 """Adds more to a world, which it is given with the place of the right shoulder in it, [3], m."""
 
 
-def build(world_looks: Looks, robot: RobotDescription, furnish: Furnish | None = None) -> tuple[mujoco.MjModel, Mount]:
+def build(
+    world_looks: Looks, robot: RobotDescription, furnishings: Sequence[Furnish] = ()
+) -> tuple[mujoco.MjModel, Mount]:
     """The compiled model of a seed's world, and how the robot stands in it."""
     spec = mujoco.MjSpec.from_file(str(robot.model_path))
     mount = Mount.of(robot, spec)
@@ -72,10 +74,11 @@ def build(world_looks: Looks, robot: RobotDescription, furnish: Furnish | None =
     _add_lights(spec, world_looks.brightness)
     _add_surroundings(spec, world_from_shoulder, mount.table_edge)
     _add_box(spec, world_from_shoulder, world_looks.measures)
-    _add_cylinders(spec, world_from_shoulder, mount.object_radius)
+    width = world_looks.measures.object_width
+    _add_cylinders(spec, world_from_shoulder, mount.object_radius if width is None else width / 2)
     _add_hand(spec, world_from_shoulder)
     _add_cameras(spec, world_looks, world_from_shoulder)
-    if furnish is not None:
+    for furnish in furnishings:
         furnish(spec, world_from_shoulder)
     return spec.compile(), mount
 
@@ -121,7 +124,7 @@ def _add_lights(spec: mujoco.MjSpec, brightness: tuple[float, float]) -> None:
         )
 
 
-def _touchable(**more: Any) -> dict[str, Any]:
+def touchable(**more: Any) -> dict[str, Any]:
     """A surface that decides how it is touched: MuJoCo takes the larger of two frictions unless one has priority."""
     return {
         "friction": TABLE_FRICTION,
@@ -143,7 +146,7 @@ def _add_surroundings(spec: mujoco.MjSpec, world_from_shoulder: Floats, near_edg
         pos=(edges.mean(), 0.0, table_z - thickness / 2),
         size=(np.ptp(edges) / 2, half_width, thickness / 2),
         rgba=RGBA["table"],
-        **_touchable(),
+        **touchable(),
     )
     spec.add_texture(
         name="sky",
@@ -171,7 +174,7 @@ def _add_surroundings(spec: mujoco.MjSpec, world_from_shoulder: Floats, near_edg
         pos=(0.0, 0.0, -0.36),
         size=(3.0, 3.0, 0.1),
         material="floor",
-        **_touchable(),
+        **touchable(),
     )
 
 
@@ -193,7 +196,7 @@ def _add_box(spec: mujoco.MjSpec, world_from_shoulder: Floats, measures: tool_bo
                 meshname=f"wedge_{number}",
                 pos=place,
                 group=HIDDEN_GROUP,
-                **_touchable(),
+                **touchable(),
             )
     row_x = float(places_in_box[0][0])
     top, low = hz, hz - tool_box.COMPARTMENT_DEPTH
@@ -215,7 +218,7 @@ def _add_block(body: Any, name: str, x: tuple[float, float], y: tuple[float, flo
         pos=ends.mean(axis=1),
         size=(ends[:, 1] - ends[:, 0]) / 2,
         group=HIDDEN_GROUP,
-        **_touchable(),
+        **touchable(),
     )
 
 

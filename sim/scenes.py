@@ -13,6 +13,7 @@ from sim.drawn_person import DrawnPerson
 from sim.hoap3 import Hoap3
 from sim.instructor import Instructor
 from sim.looks import Looks
+from sim.mishaps import Mishaps, add_card
 from sim.offered_camera import OfferedCamera
 from sim.person import Person
 from sim.place_instructor import OBJECT, PlaceInstructor
@@ -65,15 +66,21 @@ def at_the_tool_box(
     else:
         robot = ServoArm(description, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed, lockstep)
     tracked = None if options.scene == "rule_learning" else TrackedPerson(options.seed)
-    world = World(world_looks, description, None if tracked is None else tracked.furnish)
+    furnishings = [] if tracked is None else [tracked.furnish]
+    if "covered_opening" in options.mishaps:
+        furnishings.append(add_card)
+    world = World(world_looks, description, furnishings)
     drawn = DrawnPerson(world.world_from_shoulder) if tracked is None else None
     cameras: list[ImageSource] = [ViewForPeople(world.model, drawn)] if options.video else []
     if options.camera and options.scene != "relocate_by_pointing":
         camera: ImageSource = RobotCamera(world.model, world_looks, draws["noise"])
         socket = options.camera_socket
         cameras.append(camera if socket is None else OfferedCamera(camera, run_folder / socket))
+    mishaps = Mishaps(world, options.mishaps, world_looks.rules)
     if tracked is None:
-        return Simulation(world_looks, world, robot, Instructor(world, world_looks.rules, draws), cameras)
+        return Simulation(
+            world_looks, world, robot, Instructor(world, world_looks.rules, draws, mishaps=mishaps), cameras
+        )
     if options.camera:
         cameras.append(tracked.images(world, options.arm_image_every))
     person: Person
@@ -81,5 +88,5 @@ def at_the_tool_box(
         world.place(OBJECT, tool_box.standing_centre(*START))
         person = PlaceInstructor(world, draws, tracked.body, tracked.pointing)
     else:
-        person = Instructor(world, world_looks.rules, draws, tracked.body, tracked.pointing)
+        person = Instructor(world, world_looks.rules, draws, tracked.body, tracked.pointing, mishaps)
     return Simulation(world_looks, world, robot, person, cameras, world_from_table(world), tracked.write_measures)

@@ -29,6 +29,7 @@ from pydantic import Field, model_validator
 
 from paramove.bus import Bus, LockstepBarrier, NodeConfig, main, topics
 from paramove.robots import RobotFolder
+from sim.mishaps import Mishap
 from sim.scenes import build
 from sim.simulation import CAMERA_HZ, Simulated
 from sim.tool_box import Measures
@@ -61,6 +62,7 @@ OF_SCENES: Mapping[frozenset[str], frozenset[str]] = {
     frozenset({"robot"}): frozenset(get_args(Scene)) - {"pointing"},
     frozenset({"camera", "video", "measures"}): frozenset(get_args(Scene)) - {"pointing", "servo_arm"},
     frozenset({"camera_socket"}): frozenset({"rule_learning"}),
+    frozenset({"mishaps"}): frozenset({"rule_learning", "rule_learning_whole_arm"}),
     frozenset({"port"}): frozenset(get_args(Scene)) - {"pointing"},
     frozenset({"arm_image_every"}): frozenset({"rule_learning_whole_arm", "relocate_by_pointing"}),
 }
@@ -89,6 +91,7 @@ class Config(NodeConfig):
         port: Of a servo arm: link to the serial port, relative to the run's folder.
         camera_socket: Where the robot's camera offers its images instead of publishing them, relative to the run's
             folder: as a webcam does behind its device.
+        mishaps: What goes wrong before each object is pointed at, in order; see `sim.mishaps`.
         max_duration_s: Simulated time after which the run ends.
         pace: Simulated seconds per second when nobody waits for anybody (not in lockstep).
         firmware_log: Whether every frame that the firmware plays is written to the run folder (56 kB/s), for those who
@@ -107,6 +110,7 @@ class Config(NodeConfig):
     markers: tuple[Marker, ...] = ()
     port: Path = Path("by-id/usb-paramove_emulated_servos-if00-port0")
     camera_socket: Path | None = None
+    mishaps: tuple[Mishap, ...] = ()
     max_duration_s: float = Field(default=600.0, gt=0)
     pace: float = Field(default=1.0, gt=0)
     firmware_log: bool = False

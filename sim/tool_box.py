@@ -48,11 +48,13 @@ class Measures:
         camera_elevation_deg: Above the working plane. From above 52 degrees, a cylinder in its compartment can be seen.
         opening_radius: Free radius of every opening, m, above a cylinder's.
         chamfer: Height and width of the openings' chamfer, m.
+        object_width: Of the cylinders, m; None: as it suits the robot's gripper.
     """
 
     camera_elevation_deg: float = 52.0
     opening_radius: float = OPENING_RADIUS
     chamfer: float = CHAMFER
+    object_width: float | None = None
 
     def __post_init__(self) -> None:
         widest = opening.TILE_HALF

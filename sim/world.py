@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
@@ -35,11 +35,11 @@ class World:
     Args:
         looks: How it looks; lights and cameras are part of the model.
         description: The robot's joints, in the order in which torques come.
-        furnish: Adds what else is there.
+        furnishings: Add what else is there.
     """
 
-    def __init__(self, looks: Looks, description: RobotDescription, furnish: scene.Furnish | None = None) -> None:
-        self.model, self.mount = scene.build(looks, description, furnish)
+    def __init__(self, looks: Looks, description: RobotDescription, furnishings: Sequence[scene.Furnish] = ()) -> None:
+        self.model, self.mount = scene.build(looks, description, furnishings)
         self.data = mujoco.MjData(self.model)
         self.description = description
         model = self.model

@@ -6,7 +6,6 @@ import heapq
 import itertools
 from collections.abc import Callable
 
-from paramove.applications.options import RelocatorOptions
 from paramove.applications.relocator import Relocator
 from paramove.bus import topics
 from paramove.bus.subscriber import Received
@@ -16,6 +15,7 @@ from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
+from tests.applications.launched import relocator
 
 TICK_NS = 66_666_667
 MOTION_S = 4.0
@@ -40,7 +40,7 @@ class PointingStory:
     """
 
     def __init__(self, run_name: str = "run", **options) -> None:
-        self.relocator = Relocator(RelocatorOptions(**{"aligns": False, **options}), run_name)
+        self.relocator = Relocator(relocator(**{"aligns": False, **options}), run_name)
         self.offsets: list[Place] = [(0.004, -0.008)]
         self.events: list[Received | Tick] = []
         self.now_ns = 0
@@ -89,7 +89,7 @@ class PointingStory:
                 self._answer(self.points.pop(0))
             if speech.request == Speech.REQUEST_POINT_AT_OBJECT and self.offsets:
                 x, y = self.offsets.pop(0)
-                start = RelocatorOptions().start
+                start = relocator().start
                 self._answer(((start[0] + x, start[1] + y), 0.9))
 
     def run(self, seconds: float = 300.0, until: Callable[[], bool] | None = None) -> bool:

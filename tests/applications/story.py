@@ -14,6 +14,7 @@ from paramove.bus.ticks import Tick
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
+from tests.applications.launched import rule_learner
 
 TICK_NS = 66_666_667
 MOTION_S = 4.0
@@ -21,7 +22,7 @@ WIDTH = 0.021
 CORNERS = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
 OPENINGS = {"yellow": (0.135, -0.038), "green": (0.135, -0.095), "blue": (0.135, 0.019)}
 PLACES = {"yellow": (0.170, 0.05), "green": (0.180, -0.08), "blue": (0.175, -0.02)}
-OPTIONS = RuleLearnerOptions()
+OPTIONS = rule_learner()
 SUCCEEDED, FAILED, REJECTED = (
     RelocationStatus.STATE_SUCCEEDED,
     RelocationStatus.STATE_FAILED,
@@ -39,6 +40,8 @@ class Story:
         outcomes: Outcomes of the next relocations in stage 3: (state, reason, where the object is then; None: in its
             opening). When they are used up, all go well.
         in_the_way: Of the next refusals: places in the goal's `avoid`.
+        misfit: Whether what is refused is of an unfit size.
+        twins: Colours of which there are two objects.
         deaf: How many goals the arm does not hear.
         answers: Request -> what the instructor does then.
     """
@@ -55,6 +58,8 @@ class Story:
         self.calibrations: list = []
         self.outcomes: list[tuple[int, str, Place | None]] = []
         self.in_the_way: list[list[int]] = []
+        self.misfit = False
+        self.twins: set[str] = set()
         self.deaf = 0
         self.places: dict[str, Place] = {}
         self.calibrated = False
@@ -118,6 +123,7 @@ class Story:
         if self.calibrated:
             seen.x, seen.y, seen.frame = place[0], place[1], "right_shoulder"
             seen.width_m = WIDTH if name else 0.0
+        seen.twin = name in self.twins
         seen.captured.FromNanoseconds(self.now_ns)
         self._heard(topics.GESTURES, seen)
         self.learner.on_gesture(seen)
@@ -205,7 +211,8 @@ class Story:
         heapq.heapify(self._events)
 
     def _say(self, name: str, state: RelocationStatus.State, reason: str = "", in_the_way: Sequence[int] = ()) -> None:
-        status = RelocationStatus(goal_id=name, state=state, reason=reason, in_the_way=in_the_way)
+        misfit = state == REJECTED and self.misfit
+        status = RelocationStatus(goal_id=name, state=state, reason=reason, in_the_way=in_the_way, misfit=misfit)
         self._heard(topics.RELOCATION_STATUS, status)
         self.learner.on_goal_status(status)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from paramove.applications.options import RuleLearnerOptions
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
+from tests.applications.launched import rule_learner
 from tests.applications.story import PLACES, Place, Story
 
 APPLY = ApplicationStage.STAGE_APPLY
@@ -21,7 +21,7 @@ class ArmStory(Story):
     """
 
     def __init__(self) -> None:
-        super().__init__(options=RuleLearnerOptions(pointing="action_space"))
+        super().__init__(options=rule_learner(pointing="action_space"))
         self.places_said: list[Place | None] = []
 
     def _point_at(self, name: str | None) -> None:

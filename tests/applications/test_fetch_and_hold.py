@@ -7,12 +7,12 @@ import itertools
 import numpy as np
 import pytest
 
-from paramove.applications.options import RelocatorOptions
 from paramove.motion.clear_plans import MIN_CLEARANCE, ClearPlans
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.planned_motion import RestPose
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.safety.trajectory_check import check_trajectory
+from tests.applications.launched import relocator
 from tests.motion.fake_driver import FAILED, OFFER, PLACE, REJECTED, SUCCEEDED, Cell, FakeDriver, goal
 from tests.motion.reaching import ARM, HOAP3, JOINTS, OPENINGS, at, checker, planner
 
@@ -94,7 +94,7 @@ def test_the_gate_lets_the_way_to_where_the_relocator_holds_it_pass(place: tuple
     """As the driver samples it, every millisecond, from places all over the working area."""
     plans = ClearPlans(GripperArm.of(HOAP3, "right"), planner(), checker())
     lifted = plans.fetch(at(place), np.empty((0, 2))).end
-    motion = plans.hold(lifted, np.array(RelocatorOptions().hold), np.empty((0, 2)))
+    motion = plans.hold(lifted, np.array(relocator().hold), np.empty((0, 2)))
     pose = HOAP3.base_pose.copy()
     pose[JOINTS] = motion.angles[0]
     names, limits = [*ARM.joints, ARM.fingers], HOAP3.motion_limits

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from paramove.applications.options import RelocatorOptions
 from paramove.msgs.relocation_pb2 import RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.safety_state_pb2 import SafetyState
+from tests.applications.launched import relocator
 from tests.applications.pointing_story import FETCH, PLACES, PUT, RESTS, PointingStory
 
 FAILED, REJECTED = RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED
-DEFAULT = RelocatorOptions()
+DEFAULT = relocator()
 
 
 def places(goals, end):
@@ -204,7 +204,7 @@ def test_a_goal_that_nobody_hears_is_sent_again():
 @pytest.mark.parametrize("wrong", [{"places": 0}, {"min_certainty": 1.5}, {"ask_again_s": 0}, {"corners": []}])
 def test_parameters_that_make_no_sense_are_refused(wrong):
     with pytest.raises(ValidationError):
-        RelocatorOptions(**wrong)
+        relocator(**wrong)
 
 
 def test_how_a_person_points_is_learned_at_the_object_and_taken_off_every_place():

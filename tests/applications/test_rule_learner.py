@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from paramove.applications.conversation import TIMEOUT_S
 from paramove.applications.rule_learner import RuleLearner
@@ -14,6 +15,7 @@ from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 from paramove.objects.homography import PlaneHomography
+from tests.applications.launched import rule_learner
 from tests.applications.story import CORNERS, FAILED, OPENINGS, OPTIONS, PLACES, REJECTED, SUCCEEDED, WIDTH, Story
 
 CALIBRATE, LEARN = ApplicationStage.STAGE_CALIBRATE, ApplicationStage.STAGE_LEARN
@@ -334,9 +336,43 @@ def test_the_arm_waits_until_the_hand_has_left() -> None:
     story.gesture(Gesture.KIND_POINTED_AT, "blue", PLACES["blue"])
     story.run(4.0)
     assert story.relocations() == []
+    story.run(20.0)
+    assert story.relocations() == []
+    assert 2 <= story.sentences().count("I see a hand") <= 4
     story.hand(False)
     assert story.run(1.0, until=lambda: bool(story.relocations()))
     assert story.relocations()[0].object == "blue"
+
+
+def test_of_two_objects_of_one_colour_none_is_taken_before_one_is_away() -> None:
+    story = Story()
+    story.twins = {"yellow"}
+    story.answers[Speech.REQUEST_HELP] = lambda name: (story.twins.clear(), story.put(1.0, name, PLACES[name]))
+    story.run_to(APPLY)
+    assert story.run(60.0, until=lambda: "HELP" in story.requests())
+    assert "I see more than one yellow object." in story.sentences()
+    assert story.relocations() == []
+    assert story.run(), story.learner.detail
+
+
+def test_another_one_is_asked_for_in_place_of_an_object_of_unfit_size() -> None:
+    story = Story()
+    reason = "the object looks 40 mm wide; this gripper holds objects of 12 to 22 mm"
+    story.outcomes, story.misfit = [(REJECTED, reason, None)], True
+    assert story.run(), story.learner.detail
+    assert story.requests().count("HELP") == 1
+    assert f"{reason}. Please stand another one there." in story.sentences()
+
+
+def test_an_object_that_stands_on_its_opening_twice_finds_it_covered() -> None:
+    story = Story()
+    first = next(iter(OPENINGS))
+    story.outcomes = [(SUCCEEDED, "", OPENINGS[first])] * 2
+    story.run_to(APPLY)
+    assert story.run(90.0, until=lambda: "HELP" in story.requests())
+    assert len(story.relocations()) == 2, "one more than the first may have been askew"
+    assert "Please uncover the opening" in story.sentences()
+    assert story.run(), story.learner.detail
 
 
 # Calibrating, and the wire to the arm
@@ -559,3 +595,8 @@ def test_a_refusal_while_calibrating_is_no_loop(rejected: str, words: str) -> No
     assert kinds(story).count(rejected) <= 3
     story._hear = handle
     assert story.run(), story.learner.detail
+
+
+def test_somewhere_the_first_object_is_brought_to() -> None:
+    with pytest.raises(ValidationError, match="neither offer nor start"):
+        rule_learner(offer=None)

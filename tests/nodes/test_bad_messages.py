@@ -44,6 +44,7 @@ from paramove.objects.homography import PlaneHomography
 from paramove.observation import BodyKeyPoints, key_points_message
 from paramove.robots.hoap3.wire import state_message
 from tests.action_space import drawn_arm
+from tests.applications.launched import parameters
 from tests.applications.pointing_story import PointingStory
 from tests.applications.servo_cell import ServoCell
 from tests.applications.story import Story
@@ -256,8 +257,8 @@ NODES: dict[str, tuple[Any, Callable[[], list[Event]], dict[str, Any]]] = {
     "body_tracker": (body_tracker, of_body_tracker, {}),
     "action_tracker": (action_tracker, of_action_tracker, {}),
     "pose_detector": (pose_detector, of_pose_detector, {}),
-    "rule_learner": (rule_learner, of_rule_learner, {}),
-    "relocator": (relocator, of_relocator, {}),
+    "rule_learner": (rule_learner, of_rule_learner, parameters("rule_learning", "rule_learner")),
+    "relocator": (relocator, of_relocator, parameters("relocate_by_pointing", "relocator")),
     "synthesizer": (synthesizer, of_synthesizer, {"robot": ROBOT_FOLDER}),
     "reacher": (reacher, of_reacher, {"tasks": TASKS}),
     "arm_driver": (arm_driver, of_arm_driver, {"robot": ROBOT_FOLDER}),

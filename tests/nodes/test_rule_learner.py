@@ -7,7 +7,10 @@ from nodes import rule_learner
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.msgs.rule_pb2 import ApplicationStage
-from tests.applications.story import OPTIONS, PLACES, Story
+from tests.applications.launched import parameters
+from tests.applications.story import Story
+
+CONFIG = rule_learner.Config.model_validate(parameters("rule_learning", "rule_learner"))
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +22,7 @@ def story() -> Story:
 
 def test_replays_the_whole_story(story: Story) -> None:
     bus = RecordedBus(story.events)
-    rule_learner.run(bus, rule_learner.Config())
+    rule_learner.run(bus, CONFIG)
     for topic, expected in (
         (topics.RELOCATION_GOAL, story.goals),
         (topics.SPEECH, story.speech),
@@ -39,7 +42,7 @@ def test_ends_when_everything_is_put_away(story: Story) -> None:
     for _ in range(50):
         more.tick()
     bus = RecordedBus(more.events)
-    rule_learner.run(bus, rule_learner.Config())
+    rule_learner.run(bus, CONFIG)
     assert bus.now_ns == story.now_ns
     assert bus.published_on(topics.APPLICATION_STAGE)[-1].message.stage == ApplicationStage.STAGE_DONE
 
@@ -49,14 +52,8 @@ def test_silence_is_no_end() -> None:
     story.deaf = 10**6
     story.run(30.0)
     bus = RecordedBus(story.events)
-    rule_learner.run(bus, rule_learner.Config())
+    rule_learner.run(bus, CONFIG)
     assert bus.published_on(topics.APPLICATION_STAGE)[-1].message.stage == ApplicationStage.STAGE_CALIBRATE
-
-
-def test_defaults_are_the_places_of_the_demo() -> None:
-    config = rule_learner.Config()
-    assert (config.objects, config.corners, config.grasp_z) == (OPTIONS.objects, OPTIONS.corners, OPTIONS.grasp_z)
-    assert set(config.objects) == set(PLACES)
 
 
 def test_refuses_unknown_parameters() -> None:

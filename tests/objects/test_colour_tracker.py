@@ -113,6 +113,16 @@ def test_a_region_cut_in_two_stays_one() -> None:
     green = ColourTracker().update(image).objects[0]
     assert green.height_px == pytest.approx(32, abs=2)
     assert green.v_px == pytest.approx(150, abs=1)
+    assert not green.twin
+
+
+@pytest.mark.parametrize(("scale", "twin"), [(1.0, True), (0.7, True), (0.5, False)])
+def test_another_object_of_its_colour_is_noticed_apart_from_it(scale: float, twin: bool) -> None:
+    image = _drawn(200, 150)
+    half_width, half_height = round(7 * scale), round(16 * scale)
+    image[200 - half_height : 200 + half_height, 300 - half_width : 300 + half_width] = image[150, 200]
+    (green,) = ColourTracker().update(image).objects
+    assert green.twin == twin
 
 
 @pytest.mark.parametrize("array", [np.zeros((360, 480), np.uint8), np.zeros((360, 480, 3), np.float64)])

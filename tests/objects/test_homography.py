@@ -10,6 +10,7 @@ from paramove.objects.homography import HomographyError, PlaneHomography
 from tests.objects.scene import WORKING_AREA, Look, Scene
 
 CORNERS = np.array(WORKING_AREA)
+ROLL = np.array([(np.cos(0.5), np.sin(0.5)), (-np.sin(0.5), np.cos(0.5))])
 SEEN = np.array([(120.0, 130.0), (90.0, 190.0), (330.0, 230.0), (320.0, 160.0)])
 
 
@@ -57,6 +58,10 @@ def test_a_circle_is_foreshortened_by_the_sine_of_the_elevation(elevation_deg: f
     image = 560 * np.column_stack([across[:, 0], -across[:, 1] * sine]) / depth[:, None] + (240, 180)
     homography = PlaneHomography.fit(image, across)
     assert homography.foreshortening(240, 180) == pytest.approx(sine, rel=0.002)
+    assert homography.sine_of_elevation(240, 180) == pytest.approx(sine, rel=0.002)
+    rolled = PlaneHomography.fit((image - (240, 180)) @ ROLL + (240, 180), across)
+    assert rolled.foreshortening(240, 180) > 1.01 * sine
+    assert rolled.sine_of_elevation(240, 180) == pytest.approx(sine, rel=0.002)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from sim import tool_box
 from sim.scene import HOAP3
 from sim.tool_box import Measures
 from sim.world import OPENINGS_UP
-from tests.objects.scene import CYLINDER_RADIUS, Look, Scene
+from tests.objects.scene import CYLINDER_HEIGHT, CYLINDER_RADIUS, Look, Scene
 from tests.objects.stories import OPENING, RIM_RADIUS, Story, segment, show_rule
 
 
@@ -30,6 +30,8 @@ def test_a_shown_rule_is_located_within_four_millimetres(seed: int, lowering_tic
     assert np.hypot(vanished.x - OPENING[0], vanished.y - OPENING[1]) < 0.004
     moved = next(g for g in story.gestures if g.kind == Gesture.KIND_MOVED)
     assert abs(moved.width_m - 2 * CYLINDER_RADIUS) < 0.002
+    assert abs(moved.height_m - CYLINDER_HEIGHT) < 0.006
+    assert not moved.twin
 
 
 @pytest.mark.parametrize("seed", [3, 7])

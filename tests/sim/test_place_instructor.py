@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from paramove.applications.options import RelocatorOptions
 from paramove.msgs.rule_pb2 import Speech
 from sim import looks, tool_box
 from sim.arm import ELBOW, SHOULDER, TIP
@@ -18,11 +17,12 @@ from sim.place_instructor import (
     where_people_point,
 )
 from sim.small_person import POINTED_ABOVE_PLANE, SmallPerson
+from tests.applications.launched import relocator
 from tests.sim.fake_table import FakeTable
 
 TICK_S = 1 / 60
 PLACE = Speech.REQUEST_POINT_AT_PLACE
-OPTIONS = RelocatorOptions()
+OPTIONS = relocator()
 
 
 class Story:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from paramove.applications.options import Place
-from paramove.applications.stage import HAND_TIMEOUT_S, ApplicationState, Stage, cm
+from paramove.applications.stage import ApplicationState, Stage, cm
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
@@ -17,6 +17,8 @@ NEAR = 0.035
 CLEARER_BY = 0.015
 """The second nearest object must be so much farther away, m."""
 HAND_AWAY_S = 0.3
+OVER_OPENING = 0.012
+"""Maximum distance from its opening, m, of an object that should have sunk into it."""
 HELPED_IN_VAIN = 2
 """So many objects in a row that no attempt brought away: then the calibration is no longer right."""
 SETTLED_S = 1.0
@@ -81,6 +83,9 @@ class Applying(Stage):
             self.app.speak(f"You point at {name or 'something'}, but I do not know where it stands or belongs.")
             return
         self._object, self._source, self._attempt = name, place, 0
+        if name in self.app.table.twins:
+            self._ask_for_help(f"I see more than one {name} object.", please="Please leave one of them")
+            return
         self.app.speak(f"You point at {name} at {cm(place)}: it belongs to the opening at {cm(self.app.rules[name])}.")
         self.go("letting_hand_leave")
 
@@ -101,8 +106,7 @@ class Applying(Stage):
             self.go("waiting")
 
     def _letting_hand_leave(self) -> None:
-        away = self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S
-        if away or self.for_s > HAND_TIMEOUT_S:
+        if self.hand_has_left(HAND_AWAY_S):
             self._relocate()
 
     def _relocate(self) -> None:
@@ -119,7 +123,7 @@ class Applying(Stage):
             target=app.goals.position(app.rules[self._object]),
             avoid=standing.values(),
             attempt=self._attempt,
-            width=app.table.objects[self._object].width,
+            size=app.table.objects[self._object].size,
         )
         self.go("relocating")
 
@@ -141,6 +145,10 @@ class Applying(Stage):
 
         A person who moves the same object each time may never resolve that: the next time, one in its way is moved.
         """
+        if outcome.misfit:
+            detail = f"I cannot take {self._object}: {outcome.reason}."
+            self._ask_for_help(detail, please="Please stand another one there")
+            return
         self._stuck.add(self._object)
         in_the_way = [self._avoided[number] for number in outcome.in_the_way if number < len(self._avoided)]
         other = next((name for name in in_the_way if name not in self._stuck | self.app.done), "")
@@ -173,33 +181,41 @@ class Applying(Stage):
                 return None  # not detected since: the view is not settled yet
             return self._try_again(sighting.position)
         if self.for_s > 3 * self.app.options.settle_s:
-            self._ask_for_help(f"I have lost sight of {self._object}.")
+            return self._tried_in_vain(f"I have lost sight of {self._object}.")
         return None
 
     def _try_again(self, place: Place) -> ApplicationStage.Stage | None:
         app, reason = self.app, self._failure
+        if self._attempt > 1 and not reason and math.dist(place, app.rules[self._object]) < OVER_OPENING:
+            detail = f"{self._object} stands at {cm(place)}, where it belongs, and does not go in."
+            self._ask_for_help(detail, please="Please uncover the opening and put it to another place")
+            return None
         if self._attempt < app.options.attempts:
             self._source = place
             app.speak(f"{self._object} is at {cm(place)}{': ' + reason if reason else ''}. I try again.")
             self._relocate()
             return None
+        detail = f"I tried {self._attempt} times to put {self._object} away: {reason or 'it stayed'}."
+        return self._tried_in_vain(detail)
+
+    def _tried_in_vain(self, detail: str) -> ApplicationStage.Stage | None:
         self._in_vain += 1
         if self._in_vain < HELPED_IN_VAIN:
-            self._ask_for_help(f"I tried {self._attempt} times to put {self._object} away: {reason or 'it stayed'}.")
+            self._ask_for_help(detail)
             return None
-        app.speak(
-            f"Objects are not where I see them: {reason or 'they stay'}. Was the camera moved, or my base? "
-            "I calibrate again, and then need to see the rules again."
+        self.app.speak(
+            f"{detail} Was the camera moved, or my base? I calibrate again, and then need to see the rules again."
         )
-        app.rules.clear()
-        app.done.clear()
+        self.app.rules.clear()
+        self.app.done.clear()
         return ApplicationStage.STAGE_CALIBRATE
 
-    def _ask_for_help(self, detail: str, to_move: str = "") -> None:
+    def _ask_for_help(self, detail: str, to_move: str = "", please: str = "") -> None:
         self._to_move = to_move or self._object
         self._moved.add(self._to_move)
         what = "it" if self._to_move == self._object else self._to_move
-        self.app.speak(f"{detail} Please put {what} to another place.", Speech.REQUEST_HELP, self._to_move)
+        please = please or f"Please put {what} to another place"
+        self.app.speak(f"{detail} {please}.", Speech.REQUEST_HELP, self._to_move)
         self.go("helped")
 
     def _helped(self) -> None:

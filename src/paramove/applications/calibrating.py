@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from paramove.applications.options import Place
-from paramove.applications.stage import HAND_TIMEOUT_S, ApplicationState, Stage, cm
+from paramove.applications.stage import ApplicationState, Stage, cm
 from paramove.applications.table import Sighting
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
@@ -90,6 +90,7 @@ class Calibrating(Stage):
         return still[max(still)] if still else ""
 
     def _offer(self) -> None:
+        assert self.app.options.offer is not None  # else there is a start
         x, y, z = self.app.options.offer
         self.app.goal_client.start(RelocationGoal.KIND_OFFER_HAND, self.app.now_s, source=Position(x=x, y=y, z=z))
         self.go("offering")
@@ -135,8 +136,7 @@ class Calibrating(Stage):
             self._ask()
 
     def _letting_go(self) -> None:
-        away = self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S and self.for_s > 1.0
-        if away or self.for_s > HAND_TIMEOUT_S:
+        if self.hand_has_left(HAND_AWAY_S) and self.for_s > 1.0:
             target = self.app.goals.position(self._corner)
             self.app.goal_client.start(RelocationGoal.KIND_PLACE_HELD, self.app.now_s, self._held, target=target)
             self.go("placing")

@@ -70,14 +70,14 @@ class GoalClient:
         avoid: Iterable[tuple[float, float]] = (),
         attempt: int = 1,
         plan_only: bool = False,
-        width: float = 0.0,
+        size: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         """Set a goal; it is sent with the next `step`."""
         self._count += 1
         goal = RelocationGoal(
             id=f"{self._run_name}-{self._count}", kind=kind, object=name, frame=self._goals.frame, attempt=attempt
         )
-        goal.plan_only, goal.object_width_m = plan_only, width
+        goal.plan_only, goal.object_width_m, goal.object_height_m = plan_only, *size
         if source is not None:
             getattr(goal, "from").CopyFrom(source)
         if target is not None:

@@ -1,10 +1,13 @@
-"""Positions and timeouts of rule learning and relocation by pointing, as parameters of their processes."""
+"""Positions and timeouts of rule learning and relocation by pointing, as parameters of their processes.
+
+Positions depend on robot and world: the launch files give them.
+"""
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, model_validator
 
 from paramove.applications.table import Surface
 from paramove.documents import OldNames
@@ -15,7 +18,7 @@ Pointing = Literal["nearness", "action_space"]
 
 
 class ApplicationOptions(OldNames):
-    """What both have. Positions in the right shoulder's frame, m; times in s.
+    """What both have. Positions in m; times in s.
 
     Attributes:
         grasp_z: Height at which a standing object is grasped.
@@ -29,21 +32,21 @@ class ApplicationOptions(OldNames):
 
     old_names: ClassVar[tuple[tuple[str, str], ...]] = (("arm_patience_s", "arming_timeout_s"),)
 
-    grasp_z: float = -0.098
+    grasp_z: float
     attempts: int = Field(3, ge=1)
     ask_again_s: float = Field(25.0, gt=0)
     arming_timeout_s: float = Field(10.0, gt=0)
-    frame: str = "right_shoulder"
+    frame: str
 
 
 class RuleLearnerOptions(ApplicationOptions):
-    """Positions in the right shoulder's frame, m; times in s.
+    """Positions in m; times in s.
 
     Attributes:
         objects: Names (colours) of the objects.
         corners: Where the robot places an object to learn how the camera sees its working area.
         offer: Where the open hand waits for an object: x, y, and height of the gripper.
-        start: Marked position at which a person stands an object, for a hand that cannot be given one; None: it can.
+        start: Marked position at which a person stands an object, for a hand that is not given one; goes first.
         surface_x, surface_y: Range of the working surface.
         pointing: How the object pointed at is recognised: by "nearness" of the hand, or by the target of an arm tracked
             in "action_space".
@@ -51,13 +54,19 @@ class RuleLearnerOptions(ApplicationOptions):
     """
 
     objects: tuple[str, ...] = ("yellow", "green", "blue")
-    corners: tuple[Place, ...] = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
-    offer: tuple[float, float, float] = (0.155, -0.02, -0.05)
+    corners: tuple[Place, ...]
+    offer: tuple[float, float, float] | None = None
     start: Place | None = None
-    surface_x: Range = (0.100, 0.240)
-    surface_y: Range = (-0.170, 0.130)
+    surface_x: Range
+    surface_y: Range
     pointing: Pointing = "nearness"
     settle_s: float = Field(2.6, ge=0)
+
+    @model_validator(mode="after")
+    def _gets_its_first_object(self) -> Self:
+        if self.offer is None and self.start is None:
+            raise ValueError("neither offer nor start: give one of them, where a person brings the first object")
+        return self
 
     @property
     def surface(self) -> Surface:
@@ -66,7 +75,7 @@ class RuleLearnerOptions(ApplicationOptions):
 
 
 class RelocatorOptions(ApplicationOptions):
-    """Positions in the right shoulder's frame, m; times in s.
+    """Positions in m; times in s.
 
     Attributes:
         object_name: Name of the object.
@@ -93,10 +102,10 @@ class RelocatorOptions(ApplicationOptions):
     )
 
     object_name: str = "yellow"
-    start: Place = (0.165, -0.02)
-    hold: tuple[float, float, float] = (0.13, -0.12, -0.045)
-    area_x: Range = (0.125, 0.19)
-    area_y: Range = (-0.105, 0.07)
+    start: Place
+    hold: tuple[float, float, float]
+    area_x: Range
+    area_y: Range
     standing: tuple[Place, ...] = ()
     min_gap: float = Field(0.05, ge=0)
     places: int = Field(3, ge=1, le=1000)

@@ -12,8 +12,8 @@ from paramove.applications.table import Table
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 
-HAND_TIMEOUT_S = 6.0
-"""The robot waits for the hand to leave at most this long: what looks like a hand may be none."""
+REMIND_S = 6.0
+"""The robot says for what it waits if the hand stays for so long."""
 
 _log = logging.getLogger(__name__)
 
@@ -78,6 +78,13 @@ class Stage(ABC):
     def go(self, state: str) -> None:
         """Change the state."""
         self.state, self._since_s = state, self.app.now_s
+
+    def hand_has_left(self, away_s: float) -> bool:
+        """Whether no hand has been in view for so long. A person whose hand stays is asked again and again."""
+        if self.for_s > REMIND_S and self.app.table.hand_in_view:
+            self.app.speak("I wait, as I see a hand. Please take it, or what looks like it, out of my view.")
+            self.go(self.state)
+        return self.app.table.hand_away_for(self.app.now_s) > away_s
 
     @property
     def for_s(self) -> float:

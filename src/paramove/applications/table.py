@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from paramove.msgs.gesture_pb2 import Gesture
 
@@ -18,7 +18,7 @@ class Sighting:
         time_s: Capture time.
         u_px, v_px: Image point.
         position: x, y in the plane's frame, m; None while there is no calibration.
-        width: Of the object, m; 0: not known.
+        size: Width and height of the object, m; 0: not known.
     """
 
     kind: int
@@ -26,7 +26,7 @@ class Sighting:
     u_px: float
     v_px: float
     position: tuple[float, float] | None
-    width: float = 0.0
+    size: tuple[float, float] = (0.0, 0.0)
 
     @property
     def at_rest(self) -> bool:
@@ -50,24 +50,28 @@ class Surface:
 
 
 class Table:
-    """Stores the latest sighting of every object, and whether the hand is in view."""
+    """Stores the latest sighting of every object, of which colours there are two, and whether the hand is in view."""
 
     def __init__(self) -> None:
         self.objects: dict[str, Sighting] = {}
+        self.twins: set[str] = set()
         self.hand_in_view = False
         self.hand_changed_s = 0.0
 
     def on_gesture(self, gesture: Gesture) -> None:
         """Store an event."""
+        (self.twins.add if gesture.twin else self.twins.discard)(gesture.object)
         time_s = gesture.captured.ToNanoseconds() * 1e-9
         if gesture.kind in (Gesture.KIND_HAND_APPEARED, Gesture.KIND_HAND_VANISHED):
             self.hand_in_view = gesture.kind == Gesture.KIND_HAND_APPEARED
             self.hand_changed_s = time_s
+            return
+        size = (gesture.width_m, gesture.height_m)
+        if gesture.kind == Gesture.KIND_POINTED_AT and gesture.object in self.objects:
+            self.objects[gesture.object] = replace(self.objects[gesture.object], size=size)
         elif gesture.object and gesture.kind != Gesture.KIND_POINTED_AT:
             position = (gesture.x, gesture.y) if gesture.located else None
-            self.objects[gesture.object] = Sighting(
-                gesture.kind, time_s, gesture.u_px, gesture.v_px, position, gesture.width_m
-            )
+            self.objects[gesture.object] = Sighting(gesture.kind, time_s, gesture.u_px, gesture.v_px, position, size)
 
     def hand_away_for(self, now_s: float) -> float:
         """How long the hand has been out of view, s; 0 while it is in view."""

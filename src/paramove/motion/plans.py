@@ -10,6 +10,9 @@ from paramove.motion.clearance import MAX_STANDING
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.planned_motion import PlannedMotion, RestPose
 
+HEIGHT_ERROR_M = 0.015
+"""Of a height that was measured in an image."""
+
 
 class NoPlanError(ValueError):
     """A motion cannot be planned; the message gives the reason and, where there is one, the nearest possible.
@@ -21,6 +24,10 @@ class NoPlanError(ValueError):
     def __init__(self, message: str, in_the_way: frozenset[int] = frozenset()) -> None:
         super().__init__(message)
         self.in_the_way = in_the_way
+
+
+class MisfitError(NoPlanError):
+    """No object of this size can be handled."""
 
 
 def check_number(standing: Floats) -> None:
@@ -36,12 +43,20 @@ class Grasp:
     Attributes:
         target: Where the object is to be delivered, [3], m; None: not known yet.
         attempt: From 1; every second one is made in another way.
-        width: Of the object, m; None: as objects usually are.
+        width, height: Of the object, m; None: as objects usually are.
     """
 
     target: Floats | None = None
     attempt: int = 1
     width: float | None = None
+    height: float | None = None
+
+    def check_height(self, usual: float) -> None:
+        """Raises MisfitError for an object that is taller than those, m, that motions are planned for."""
+        if self.height is not None and self.height > usual + HEIGHT_ERROR_M:
+            raise MisfitError(
+                f"the object looks {1000 * self.height:.0f} mm high; the arm moves objects of {1000 * usual:.0f} mm"
+            )
 
 
 USUAL = Grasp()

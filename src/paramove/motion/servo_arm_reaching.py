@@ -23,7 +23,7 @@ from paramove.motion.learned_path import SMOOTHING, LearnedPath, PlacedPerson
 from paramove.motion.modelled_movement import robot_movement
 from paramove.motion.planar_path import NoJointPathError, planar_path
 from paramove.motion.planned_motion import Held, PlannedMotion, RestPose
-from paramove.motion.plans import USUAL, Grasp, NoPlanError, check_number
+from paramove.motion.plans import USUAL, Grasp, MisfitError, NoPlanError, check_number
 from paramove.motion.timing import minimum_jerk, ramped, rest_to_rest, smoothed
 from paramove.phmm import ParametricHMM
 from paramove.robots import DescriptionError, OutOfReachError, RobotDescription
@@ -128,14 +128,16 @@ class ServoArmReaching:
         """Grasp the object at `source` and lift it. Arguments and errors as for `reach`.
 
         Where the target is known, it is grasped with a pitch that reaches that, too, so that it will stand upright.
-        Every second attempt is made with another pitch and a wider gripper.
+        Every second attempt is made with another pitch and a wider gripper; the widest objects need that, too.
         """
+        grasp.check_height(self._clearance.cylinder.height)
         width = self._held_width(grasp.width)
         point = self._beside(source, width, FINGER_GAP_M)
         pitch = self._pitch_of_both(point, None if grasp.target is None else self._beside(grasp.target, width))
         opening = self.options.work_opening
         if grasp.attempt % 2 == 0:
             pitch = self._grasp_pitch(point, pitch - np.deg2rad(self.options.second_turn_deg))
+        if grasp.attempt % 2 == 0 or (self._fixed_finger is None and width > self._widths[1] - 2 * FINGER_GAP_M):
             opening = self.options.second_opening
         motion = self._begun(start, standing)
         motion.held = Held(pitch, width)
@@ -393,12 +395,12 @@ class ServoArmReaching:
         return self._grasp_pitch(source, preferred)
 
     def _held_width(self, width: float | None) -> float:
-        """A width that the gripper holds, m, as measured ones are not exact; raises NoPlanError."""
+        """A width that the gripper holds, m, as measured ones are not exact; raises MisfitError."""
         narrowest, widest = self._widths
         if width is None:
             return self._usual_width
         if not narrowest - WIDTH_ERROR_M <= width <= widest + WIDTH_ERROR_M:
-            raise NoPlanError(
+            raise MisfitError(
                 f"the object looks {1000 * width:.0f} mm wide; this gripper holds objects of {1000 * narrowest:.0f} to "
                 f"{1000 * widest:.0f} mm"
             )

@@ -15,7 +15,7 @@ from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.arm_state import ArmState
 from paramove.motion.planned_motion import PlannedMotion, RestPose, motion_message
-from paramove.motion.plans import Grasp, MotionPlans, NoPlanError
+from paramove.motion.plans import Grasp, MisfitError, MotionPlans, NoPlanError
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.robots import OutOfReachError
@@ -207,7 +207,7 @@ class Synthesizer:
     def _fetch(self, goal: RelocationGoal, then: Callable[[RestPose, Floats, Floats], PlannedMotion]) -> _Course:
         source, target, standing = point_of(goal, "from"), point_of(goal, "to"), standing_of(goal)
         known = target if goal.kind == RelocationGoal.KIND_RELOCATE else None
-        grasp = Grasp(known, goal.attempt, width_of(goal))
+        grasp = Grasp(known, goal.attempt, size_of(goal, "width"), size_of(goal, "height"))
         fetch = self._plans.fetch(source, standing, self._start_of(goal), grasp)
         onwards = then(fetch.end, target, standing)  # known to be possible before the arm moves
         yield fetch
@@ -262,6 +262,7 @@ class Synthesizer:
             self._report(goal.id, RelocationStatus.STATE_REJECTED, reason=str(error))
             if isinstance(error, NoPlanError):
                 self._latest[goal.id].in_the_way.extend(sorted(error.in_the_way))
+                self._latest[goal.id].misfit = isinstance(error, MisfitError)
 
     def _begin(self, goal: RelocationGoal) -> None:
         if not goal.id:
@@ -399,12 +400,12 @@ def hull_of(goal: RelocationGoal, name: str, plans: MotionPlans) -> RelocationSt
     return RelocationStatus.HULL_INSIDE if within else RelocationStatus.HULL_OUTSIDE
 
 
-def width_of(goal: RelocationGoal) -> float | None:
-    """Width of the object, m; None if the goal has none; raises GoalRejectedError if it is none."""
-    width = goal.object_width_m
-    if not 0.0 <= width <= FARTHEST:  # NaN is not either
-        raise GoalRejectedError(f"object_width_m is {width}; 0 (not known) to {FARTHEST:g} m expected")
-    return width or None
+def size_of(goal: RelocationGoal, name: str) -> float | None:
+    """Its object's "width" or "height", m; None if the goal has none; raises GoalRejectedError if it is none."""
+    size: float = getattr(goal, f"object_{name}_m")
+    if not 0.0 <= size <= FARTHEST:  # NaN is not either
+        raise GoalRejectedError(f"object_{name}_m is {size}; 0 (not known) to {FARTHEST:g} m expected")
+    return size or None
 
 
 def standing_of(goal: RelocationGoal) -> Floats:

@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class RelocationGoal(_message.Message):
-    __slots__ = ("id", "kind", "object", "frame", "to", "attempt", "avoid", "asked_again", "object_width_m", "plan_only")
+    __slots__ = ("id", "kind", "object", "frame", "to", "attempt", "avoid", "asked_again", "object_width_m", "object_height_m", "plan_only")
     class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         KIND_UNSPECIFIED: _ClassVar[RelocationGoal.Kind]
@@ -37,6 +37,7 @@ class RelocationGoal(_message.Message):
     AVOID_FIELD_NUMBER: _ClassVar[int]
     ASKED_AGAIN_FIELD_NUMBER: _ClassVar[int]
     OBJECT_WIDTH_M_FIELD_NUMBER: _ClassVar[int]
+    OBJECT_HEIGHT_M_FIELD_NUMBER: _ClassVar[int]
     PLAN_ONLY_FIELD_NUMBER: _ClassVar[int]
     id: str
     kind: RelocationGoal.Kind
@@ -47,8 +48,9 @@ class RelocationGoal(_message.Message):
     avoid: _containers.RepeatedCompositeFieldContainer[Position]
     asked_again: bool
     object_width_m: float
+    object_height_m: float
     plan_only: bool
-    def __init__(self, id: _Optional[str] = ..., kind: _Optional[_Union[RelocationGoal.Kind, str]] = ..., object: _Optional[str] = ..., frame: _Optional[str] = ..., to: _Optional[_Union[Position, _Mapping]] = ..., attempt: _Optional[int] = ..., avoid: _Optional[_Iterable[_Union[Position, _Mapping]]] = ..., asked_again: bool = ..., object_width_m: _Optional[float] = ..., plan_only: bool = ..., **kwargs) -> None: ...
+    def __init__(self, id: _Optional[str] = ..., kind: _Optional[_Union[RelocationGoal.Kind, str]] = ..., object: _Optional[str] = ..., frame: _Optional[str] = ..., to: _Optional[_Union[Position, _Mapping]] = ..., attempt: _Optional[int] = ..., avoid: _Optional[_Iterable[_Union[Position, _Mapping]]] = ..., asked_again: bool = ..., object_width_m: _Optional[float] = ..., object_height_m: _Optional[float] = ..., plan_only: bool = ..., **kwargs) -> None: ...
 
 class Position(_message.Message):
     __slots__ = ("x", "y", "z")
@@ -61,7 +63,7 @@ class Position(_message.Message):
     def __init__(self, x: _Optional[float] = ..., y: _Optional[float] = ..., z: _Optional[float] = ...) -> None: ...
 
 class RelocationStatus(_message.Message):
-    __slots__ = ("captured", "goal_id", "state", "phase", "reason", "holding", "elbow_turn_rad", "in_the_way", "from_hull", "to_hull")
+    __slots__ = ("captured", "goal_id", "state", "phase", "reason", "holding", "elbow_turn_rad", "in_the_way", "from_hull", "to_hull", "misfit")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_UNSPECIFIED: _ClassVar[RelocationStatus.State]
@@ -94,6 +96,7 @@ class RelocationStatus(_message.Message):
     IN_THE_WAY_FIELD_NUMBER: _ClassVar[int]
     FROM_HULL_FIELD_NUMBER: _ClassVar[int]
     TO_HULL_FIELD_NUMBER: _ClassVar[int]
+    MISFIT_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     goal_id: str
     state: RelocationStatus.State
@@ -104,4 +107,5 @@ class RelocationStatus(_message.Message):
     in_the_way: _containers.RepeatedScalarFieldContainer[int]
     from_hull: RelocationStatus.Hull
     to_hull: RelocationStatus.Hull
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., goal_id: _Optional[str] = ..., state: _Optional[_Union[RelocationStatus.State, str]] = ..., phase: _Optional[str] = ..., reason: _Optional[str] = ..., holding: bool = ..., elbow_turn_rad: _Optional[float] = ..., in_the_way: _Optional[_Iterable[int]] = ..., from_hull: _Optional[_Union[RelocationStatus.Hull, str]] = ..., to_hull: _Optional[_Union[RelocationStatus.Hull, str]] = ...) -> None: ...
+    misfit: bool
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., goal_id: _Optional[str] = ..., state: _Optional[_Union[RelocationStatus.State, str]] = ..., phase: _Optional[str] = ..., reason: _Optional[str] = ..., holding: bool = ..., elbow_turn_rad: _Optional[float] = ..., in_the_way: _Optional[_Iterable[int]] = ..., from_hull: _Optional[_Union[RelocationStatus.Hull, str]] = ..., to_hull: _Optional[_Union[RelocationStatus.Hull, str]] = ..., misfit: bool = ...) -> None: ...

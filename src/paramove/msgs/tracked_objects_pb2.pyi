@@ -38,7 +38,7 @@ class Opening(_message.Message):
     def __init__(self, u_px: _Optional[float] = ..., v_px: _Optional[float] = ..., area_px: _Optional[float] = ..., width_px: _Optional[float] = ..., height_px: _Optional[float] = ...) -> None: ...
 
 class TrackedObject(_message.Message):
-    __slots__ = ("name", "kind", "u_px", "v_px", "area_px", "width_px", "height_px", "confidence", "left_px", "top_px", "outline", "lean")
+    __slots__ = ("name", "kind", "u_px", "v_px", "area_px", "width_px", "height_px", "confidence", "left_px", "top_px", "outline", "lean", "twin")
     class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         KIND_UNSPECIFIED: _ClassVar[TrackedObject.Kind]
@@ -59,6 +59,7 @@ class TrackedObject(_message.Message):
     TOP_PX_FIELD_NUMBER: _ClassVar[int]
     OUTLINE_FIELD_NUMBER: _ClassVar[int]
     LEAN_FIELD_NUMBER: _ClassVar[int]
+    TWIN_FIELD_NUMBER: _ClassVar[int]
     name: str
     kind: TrackedObject.Kind
     u_px: float
@@ -71,7 +72,8 @@ class TrackedObject(_message.Message):
     top_px: float
     outline: _containers.RepeatedCompositeFieldContainer[OutlinePoint]
     lean: float
-    def __init__(self, name: _Optional[str] = ..., kind: _Optional[_Union[TrackedObject.Kind, str]] = ..., u_px: _Optional[float] = ..., v_px: _Optional[float] = ..., area_px: _Optional[float] = ..., width_px: _Optional[float] = ..., height_px: _Optional[float] = ..., confidence: _Optional[float] = ..., left_px: _Optional[float] = ..., top_px: _Optional[float] = ..., outline: _Optional[_Iterable[_Union[OutlinePoint, _Mapping]]] = ..., lean: _Optional[float] = ...) -> None: ...
+    twin: bool
+    def __init__(self, name: _Optional[str] = ..., kind: _Optional[_Union[TrackedObject.Kind, str]] = ..., u_px: _Optional[float] = ..., v_px: _Optional[float] = ..., area_px: _Optional[float] = ..., width_px: _Optional[float] = ..., height_px: _Optional[float] = ..., confidence: _Optional[float] = ..., left_px: _Optional[float] = ..., top_px: _Optional[float] = ..., outline: _Optional[_Iterable[_Union[OutlinePoint, _Mapping]]] = ..., lean: _Optional[float] = ..., twin: bool = ...) -> None: ...
 
 class OutlinePoint(_message.Message):
     __slots__ = ("u_px", "v_px")

@@ -22,6 +22,8 @@ from paramove.objects.full_size import FullSize, Size
 from paramove.objects.openings import find_openings
 
 MAX_PIECES = 6
+TWIN_SHARE = 0.4
+"""Of the area of the largest region of a colour, from which another one apart from it can be an object."""
 
 
 @dataclass(frozen=True)
@@ -113,28 +115,32 @@ class ColourTracker:
         _, coloured = cv2.threshold(chroma, int(_min_chroma(small, hsv)), 255, cv2.THRESH_BINARY)
         tracked.openings.extend(find_openings(hsv[:, :, 2]))
         for colour in self._colours:
-            box = self._find(_of_colour(hsv, coloured, colour))
+            box, twin = self._find(_of_colour(hsv, coloured, colour))
             region = None if box is None else _measure(image_bgr, box, colour)
             if region is not None and region.area_px >= self._min_area:
                 tracked.objects.append(self._message(colour, region))
+                tracked.objects[-1].twin = twin and not colour.hand
             else:
                 self._recent[colour.name].clear()
         return tracked
 
-    def _find(self, mask: Image) -> tuple[int, int, int, int] | None:
-        """Box (left, top, right, bottom), full-resolution px, of the largest region and its nearby pieces."""
+    def _find(self, mask: Image) -> tuple[tuple[int, int, int, int] | None, bool]:
+        """Box (left, top, right, bottom), full-resolution px, of the largest region and its nearby pieces.
+
+        Also whether there is another one that can be an object.
+        """
         x, y, width, height = cv2.boundingRect(mask)
         if width == 0:
-            return None
+            return None, False
         _, _, stats, _ = cv2.connectedComponentsWithStats(mask[y : y + height, x : x + width], connectivity=8)
         minimum, maximum = self._min_area / 4, self._max_area_fraction * mask.size
         areas = stats[1:, cv2.CC_STAT_AREA]
         pieces = stats[1:][(areas >= max(2.0, 0.1 * minimum)) & (areas <= maximum)]
         pieces = pieces[np.argsort(-pieces[:, cv2.CC_STAT_AREA], kind="stable")][:MAX_PIECES]
         if not len(pieces) or pieces[0][cv2.CC_STAT_AREA] < minimum:
-            return None
+            return None, False
         left, top, right, bottom = _corners(pieces[0])
-        reach = max(right - left, bottom - top)
+        reach, twin = max(right - left, bottom - top), False
         for piece in pieces[1:]:  # an arm in front may cut a region into pieces
             if piece[cv2.CC_STAT_AREA] < max(minimum, 0.1 * pieces[0][cv2.CC_STAT_AREA]):
                 break
@@ -142,7 +148,9 @@ class ColourTracker:
             if max(left - other[2], other[0] - right, top - other[3], other[1] - bottom) <= 0.5 * reach:
                 left, top = min(left, other[0]), min(top, other[1])
                 right, bottom = max(right, other[2]), max(bottom, other[3])
-        return 2 * (x + left), 2 * (y + top), 2 * (x + right), 2 * (y + bottom)
+            else:
+                twin |= bool(piece[cv2.CC_STAT_AREA] >= TWIN_SHARE * pieces[0][cv2.CC_STAT_AREA])
+        return (2 * (x + left), 2 * (y + top), 2 * (x + right), 2 * (y + bottom)), twin
 
     def _message(self, colour: Colour, region: Region) -> TrackedObject:
         kind = TrackedObject.KIND_HAND if colour.hand else TrackedObject.KIND_OBJECT

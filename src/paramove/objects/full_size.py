@@ -13,6 +13,8 @@ POSITION_RADIUS_PX = 24.0
 """Closer samples belong to one position: about one object's width apart, over which the size changes by < 3 %."""
 ACCEPT_RATIO = 0.85
 """A sample below this fraction of the expected area is partly occluded, unless it is as slender as expected."""
+EXCHANGED_RATIO = 1.4
+"""An object so much larger than expected may be another one, which is exchanged back later."""
 AS_SLENDER = 0.11
 """Maximum difference of the logarithms of height and width: depth changes both alike, occlusion does not."""
 POSITIONS_PER_OBJECT = 12
@@ -53,6 +55,7 @@ class _SizeSample:
     u_px: float
     v_px: float
     size: Size
+    stands: bool
 
 
 class FullSize:
@@ -66,6 +69,7 @@ class FullSize:
 
     def __init__(self) -> None:
         self._samples: dict[str, list[_SizeSample]] = {}
+        self._before: dict[str, list[_SizeSample]] = {}
         self._model: dict[str, Floats] = {}
         self._slope: Floats = np.zeros((2, 5))
 
@@ -83,19 +87,44 @@ class FullSize:
         full = self.expected(name, u_px, v_px)
         return 1.0 if full is None else min(1.0, area_px / full.area_px)
 
-    def learn(self, name: str, u_px: float, v_px: float, size: Size) -> None:
-        """Adds one sample of an object that stands still."""
-        area_px = size.area_px
+    def was_exchanged_back(self, name: str, u_px: float, v_px: float, size: Size) -> bool:
+        """Whether it looks as before it grew: then it is as before, as the larger object was another one."""
+        if name not in self._before:
+            return False
+        self._exchange(name)
         full = self.expected(name, u_px, v_px)
+        again = full is not None and _as_slender(size, full) and size.area_px > ACCEPT_RATIO * full.area_px
+        if not again:
+            self._exchange(name)
+        return again
+
+    def _exchange(self, name: str) -> None:
+        self._samples[name], self._before[name] = self._before[name], self._samples[name]
+        self._fit()
+
+    def learn(self, name: str, u_px: float, v_px: float, size: Size, *, stands: bool = True) -> None:
+        """Adds one sample of an object that stands still.
+
+        Args:
+            stands: It is known to stand on the surface. Samples of an object that may as well be held up, nearer to the
+                camera, count only until there is one of it standing.
+        """
+        samples = self._samples.setdefault(name, [])
+        if samples and samples[0].stands and not stands:
+            return
+        if stands and samples and not samples[0].stands:
+            samples.clear()
+        area_px, full = size.area_px, self.expected(name, u_px, v_px) if samples else None
         if full is not None and not _as_slender(size, full):
             if area_px < ACCEPT_RATIO * full.area_px:
                 return
             if area_px > full.area_px / ACCEPT_RATIO:
-                self._samples[name] = []  # the earlier samples were partly occluded
-        samples = self._samples.setdefault(name, [])
+                if area_px > EXCHANGED_RATIO * full.area_px:
+                    self._before[name] = samples.copy()
+                samples.clear()  # the earlier samples were of a smaller object, or partly occluded
         near = min(samples, key=lambda sample: _distance(sample, u_px, v_px), default=None)
         if near is None or _distance(near, u_px, v_px) > POSITION_RADIUS_PX:
-            samples.append(_SizeSample(u_px, v_px, size))
+            samples.append(_SizeSample(u_px, v_px, size, stands))
             del samples[:-POSITIONS_PER_OBJECT]
         elif area_px > 1.02 * near.size.area_px:
             near.u_px, near.v_px, near.size = u_px, v_px, size

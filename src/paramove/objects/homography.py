@@ -109,10 +109,19 @@ class PlaneHomography:
 
         Straight from above it is 1; of a camera that is not rolled, it is the sine of its elevation.
         """
+        across, down = self._along_axes(u_px, v_px)
+        return float(np.linalg.norm(down) / np.linalg.norm(across))
+
+    def sine_of_elevation(self, u_px: float, v_px: float) -> float:
+        """Of the camera above the plane as seen from (u, v): a small circle's minor axis over its major axis there."""
+        major, minor = np.linalg.svd(self._along_axes(u_px, v_px), compute_uv=False)
+        return float(minor / major)
+
+    def _along_axes(self, u_px: float, v_px: float) -> Floats:
+        """How u and v (rows) change along 1 mm of x and y (columns) near (u, v), px."""
         x, y = self.plane_from_image(u_px, v_px)
         along_x, along_y = (np.array(self.image_from_plane(x + dx, y + dy)) for dx, dy in ((1e-3, 0.0), (0.0, 1e-3)))
-        across, down = np.column_stack([along_x, along_y]) - np.array([[u_px], [v_px]])
-        return float(np.linalg.norm(down) / np.linalg.norm(across))
+        return np.asarray(np.column_stack([along_x, along_y]) - np.array([[u_px], [v_px]]), dtype=np.float64)
 
     def _check_not_mirrored(self, image: Floats) -> None:
         depths = image @ self.plane_from_image_matrix[2, :2] + self.plane_from_image_matrix[2, 2]

@@ -30,6 +30,7 @@ class MotionThresholds:
         part_share: Below this fraction it does not count as resting: it has partly sunk, or is occluded.
         remnant_share: Below this fraction a moving object counts as undetected: its top may stay visible in an opening.
         clear_view_s: Maximum waiting time for a clear view of an object that has come to rest.
+        stands_s: An object that rests for so long stands on the table. A gripper that holds one may pause for a second.
     """
 
     moved_px: float = 3.0
@@ -43,6 +44,7 @@ class MotionThresholds:
     part_share: float = 0.6
     remnant_share: float = 0.35
     clear_view_s: float = 2.0
+    stands_s: float = 1.7
 
 
 class State(enum.Enum):
@@ -85,6 +87,7 @@ class ObjectMotion:
         self._still_since: float | None = None
         self._reported_area_px = 0.0
         self._clearly_visible_s = 0.0
+        self._rests_since_s = 0.0
 
     def update(self, sample: Sample | None, now_s: float, hand_near: bool) -> list[Transition]:
         """Processes one frame: the object's sample in it or None.
@@ -151,13 +154,17 @@ class ObjectMotion:
             return []
         best = Sample.median(still)
         assert self.position is not None
-        best.teach(self._full_size, self.name)
+        self._teach(best)
         if best.area_px > self.position.area_px:
             self.position = best
         if best.area_px > 1.08 * self._reported_area_px and self.visible_fraction(best) >= self._limits.clear_share:
             self._reported_area_px = best.area_px
             return [Transition(Gesture.KIND_RESTED, best.u_px, best.v_px, self.visible_fraction(best))]
         return []
+
+    def _teach(self, position: Sample) -> None:
+        stands = position.time_s - self._rests_since_s >= self._limits.stands_s
+        position.teach(self._full_size, self.name, stands=stands)
 
     def _still_samples(self, now_s: float) -> list[Sample]:
         """The samples of the last `rest_s`, or [] if any border moved."""
@@ -193,9 +200,12 @@ class ObjectMotion:
         if visible < self._limits.clear_share and not waited:
             return []
         if visible < self._limits.part_share:
-            return [self._vanish()] if self.state is State.MOVING else []
+            if not self._full_size.was_exchanged_back(self.name, position.u_px, position.v_px, position.size):
+                return [self._vanish()] if self.state is State.MOVING else []
+            visible = self.visible_fraction(position)
         kind = Gesture.KIND_RESTED if self.state is State.MOVING else Gesture.KIND_APPEARED
         self.state, self.position, self._reported_area_px = State.RESTING, position, position.area_px
         self._still_since = None
-        position.teach(self._full_size, self.name)
+        self._rests_since_s = position.time_s - still_s
+        self._teach(position)
         return [Transition(kind, position.u_px, position.v_px, visible)]

@@ -22,6 +22,8 @@ BLIND_S = 0.35
 LONGEST_STEP_S = 0.2
 """Maximum observation time that one image counts for."""
 MAX_PX = 1e6
+MAX_SINE = 0.98
+"""Of the camera's elevation: one that is higher up does not see how high an object is."""
 CLOCK_BACK_S = 5.0
 """An image older than this is not delayed: the clock, or an image's time, was wrong."""
 
@@ -147,16 +149,27 @@ class Recognizer:
                 self._put_over_opening(gesture, homography)
             gesture.located, gesture.frame = True, homography.plane_frame
             gesture.x, gesture.y = homography.plane_from_image(gesture.u_px, gesture.v_px)
-            gesture.width_m = self._width(gesture, homography)
+            gesture.width_m, gesture.height_m = self._size(gesture, homography)
+        gesture.twin = any(one.twin for one in tracked.objects if one.name == name)
         return gesture
 
-    def _width(self, gesture: Gesture, homography: PlaneHomography) -> float:
-        """Of an object as it looks where it is, m; 0 if that is not known."""
+    def _size(self, gesture: Gesture, homography: PlaneHomography) -> tuple[float, float]:
+        """Width and height, m, of an upright object as it looks where it is; 0 if that is not known.
+
+        Its region is as high as its axis, foreshortened, and the circles at its ends, to where they are half as wide.
+        A lean changes neither its area nor its height.
+        """
         full = self._full_size.expected(gesture.object, gesture.u_px, gesture.v_px)
         if full is None:
-            return 0.0
-        sides = (gesture.u_px - full.width_px / 2, gesture.u_px + full.width_px / 2)
-        return math.dist(*(homography.plane_from_image(side, gesture.v_px) for side in sides))
+            return 0.0, 0.0
+        slant = math.hypot(1.0, full.lean)
+        across_px = full.area_px / full.height_px
+        sides = (gesture.u_px - across_px / slant / 2, gesture.u_px + across_px / slant / 2)
+        width = math.dist(*(homography.plane_from_image(side, gesture.v_px) for side in sides))
+        ends_px = math.sqrt(3) / 2 * homography.foreshortening(gesture.u_px, gesture.v_px) * across_px
+        sine = min(homography.sine_of_elevation(gesture.u_px, gesture.v_px), MAX_SINE)
+        axis_px = slant * max(0.0, full.height_px - ends_px)
+        return width, axis_px * width / (across_px / slant * math.sqrt(1.0 - sine**2))
 
     def _put_over_opening(self, gesture: Gesture, homography: PlaneHomography) -> None:
         """Moves a gesture over an opening to where an object with its foot in the opening's middle would be detected.

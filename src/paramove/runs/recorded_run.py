@@ -127,6 +127,11 @@ class RecordedRun:
     begun_ns: int = 0
     gaps: tuple[RecordingGap, ...] = ()
 
+    def title(self, application: str) -> str:
+        """With robot and seed."""
+        robot = robot_in(self.folder)
+        return ", ".join((application, *([] if robot is None else [robot.name]), f"seed {self.truth.layout.seed}"))
+
     def captured_s(self, message: Any) -> float:
         """Capture time of a message."""
         return float(1e-9 * (message.captured.ToNanoseconds() - self.begun_ns))
@@ -262,6 +267,15 @@ def _read_json(path: Path) -> dict[str, Any]:
         return {"success": False, "reason": f"the judge wrote no {path.name}"}
     content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return content
+
+
+def robot_in(folder: Path) -> Path | None:
+    """Folder of the robot's description that the run's synthesizer had; None if it had none. Raises RunFolderError."""
+    path = folder / "nodes" / "synthesizer.yaml"
+    if not path.is_file():
+        return None
+    robot = read_document(path, "configuration of a node", RunFolderError).data.get("parameters", {}).get("robot")
+    return None if robot is None else Path(robot)
 
 
 def read_facts(folder: Path) -> dict[str, Any]:

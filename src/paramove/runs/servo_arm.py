@@ -23,7 +23,7 @@ from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording import PartedRecording
 from paramove.robots import RobotDescription
 from paramove.runs.after_a_run import evaluated, write_run_json
-from paramove.runs.recorded_run import RunFolderError
+from paramove.runs.recorded_run import RunFolderError, robot_in
 
 REACHED_M, PLACED_M = 0.015, 0.010
 """The hand hangs below its commanded position: a servo holds a load by its position error."""
@@ -93,7 +93,10 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
     from paramove.runs.servo_arm_film import write_film
 
     picture = _draw(folder / "tasks.png", results, states)
-    video = None if options.no_video else write_film(folder, _robot_of(folder), states, console)
+    robot = robot_in(folder)
+    video = None
+    if robot is not None and not options.no_video:
+        video = write_film(folder, RobotDescription.load(robot), states, console)
     report = _write_report(folder, results, picture, video)
     for path in (report, picture, *([] if video is None else [video]), numbers):
         console.print(f"{path.name:16s} {path}", markup=False, soft_wrap=True)
@@ -119,14 +122,6 @@ def _tasks_in(folder: Path) -> list[dict[str, Any]]:
         return list(read_document(path, "configuration of a node").data["parameters"]["tasks"])
     except (InputError, KeyError, TypeError) as error:
         raise RunFolderError(f"{path} has no tasks of the run ({error!r})") from error
-
-
-def _robot_of(folder: Path) -> RobotDescription:
-    path = folder / "nodes" / "arm_driver.yaml"
-    try:
-        return RobotDescription.load(Path(read_document(path, "configuration of a node").data["parameters"]["robot"]))
-    except (InputError, KeyError, TypeError) as error:
-        raise RunFolderError(f"{path} names no robot ({error!r})") from error
 
 
 def _write_report(folder: Path, results: Sequence[TaskResult], picture: Path, video: Path | None) -> Path:

@@ -30,7 +30,7 @@ def write_relocation_report(
 ) -> Path:
     """Write `report.html` into the run's folder; the video is put into it."""
     good = summary["success"]
-    title = f"Relocation by pointing, seed {summary['seed']}"
+    title = run.title("Relocation by pointing")
     subtitle = summary["reason"] or f"{summary['good']} of {len(relocations)} times the object ended where it should"
     legend = (
         "Ring: where the person pointed; dashed, what counts as there "

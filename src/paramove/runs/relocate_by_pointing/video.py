@@ -47,7 +47,7 @@ def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
     speech = [(r.publish_ns, r.message.text) for r in run.received(topics.SPEECH)]
     states = [(r.publish_ns, r.message.step.replace("_", " ")) for r in run.received(topics.APPLICATION_STAGE)]
     path = run.folder / "relocations.mp4"
-    title = f"relocation by pointing, seed {run.truth.layout.seed}"
+    title = run.title("relocation by pointing")
     with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
         picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         frames = track(_frames(run), "video", views // EVERY, console=console, transient=True)

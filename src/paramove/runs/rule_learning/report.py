@@ -59,9 +59,10 @@ def page(evaluation: RunEvaluation, video: Path | None) -> str:
         _origin(summary),
     ]
     placed = f"{summary['objects_placed']} of {len(summary['rules'])} objects rest in their own opening"
-    world = f"Rule learning, world {summary['seed']}, {summary['simulated_s']:.0f} s simulated"
+    title = evaluation.run.title("Rule learning")
+    world = f"{title}, {summary['simulated_s']:.0f} s simulated"
     return report_page(
-        f"Rule learning, seed {summary['seed']}",
+        title,
         f"{'Success' if summary['success'] else 'Failure'}: {placed}",
         f"{world}: {summary['reason']}. Judged by the recorded truth.",
         parts,

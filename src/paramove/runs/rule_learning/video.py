@@ -38,7 +38,7 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
     story = Story(run, evaluation.relocations)
     factor = 2 if run.end_s <= LONG_RUN_S else 4
     every = round(factor * CAMERA_HZ / FRAMES_PER_S)
-    frame = VideoFrame(f"rule learning, seed {run.truth.layout.seed}", factor)
+    frame = VideoFrame(run.title("rule learning"), factor)
     path = run.folder / "demo.mp4"
     with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
         indices = range(0, number, every)
