@@ -30,7 +30,8 @@ MISHAPS: tuple[Mishap, ...] = get_args(Mishap)
 LINGERS_S = 20.0
 FAR = np.array((0.228, -0.150))
 """A corner of the box that a Koch does not reach, shoulder frame, m."""
-MOVED = np.array((0.025, 0.02, 0.0))
+CAMERA_MOVED, BASE_MOVED = np.array((0.025, 0.02, 0.0)), np.array((0.0, 0.03, 0.0))
+"""m; sideways, the base still has the box before it."""
 CARD = "card"
 CARD_HALF = (0.022, 0.022, 0.001)
 CARD_AWAY = np.array((0.0, -1.0, -0.5))
@@ -99,6 +100,8 @@ class Mishaps:
             )
             self._set(model.geom_rbound, geom.id, 2.2 * float(np.hypot(radius, half_height)))
             self._set(model.geom_aabb, geom.id, 2.2 * model.geom_aabb[geom.id])
+            bounds = model.body_bvhadr[geom.bodyid[0]]
+            self._set(model.bvh_aabb, bounds, 2.2 * model.bvh_aabb[bounds])
             if not wide:
                 x, y, z = self._world.position(name)
                 self._world.place(name, np.array((x, y, z + 0.8 * half_height)))
@@ -113,10 +116,10 @@ class Mishaps:
         """Somebody pushed it; no one puts that right."""
         model = self._world.model
         if kind == "moved_camera":
-            model.cam_pos[model.camera("camera").id] += MOVED
+            model.cam_pos[model.camera("camera").id] += CAMERA_MOVED
         else:
-            model.body_pos[model.body(self._world.mount.root).id] += MOVED
-            self.base_moved = MOVED
+            model.body_pos[model.body(self._world.mount.root).id] += BASE_MOVED
+            self.base_moved = BASE_MOVED
 
     def _set(self, array: Floats, row: int, value: ArrayLike) -> None:
         """Until it is mended."""

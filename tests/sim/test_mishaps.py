@@ -10,7 +10,7 @@ from paramove.robots.description import RobotDescription
 from sim import looks, tool_box
 from sim.hand import Hand
 from sim.looks import Looks
-from sim.mishaps import CARD, CARD_AWAY, FAR, LINGERS_S, MISHAPS, MOVED, Mishap, Mishaps, add_card
+from sim.mishaps import CAMERA_MOVED, CARD, CARD_AWAY, FAR, LINGERS_S, MISHAPS, Mishap, Mishaps, add_card
 from sim.sights import Sights
 from sim.world import World
 
@@ -81,11 +81,19 @@ def test_what_is_changed(description: RobotDescription) -> None:
     foot = scene.world.data.qpos[scene.world.model.joint(NAME).qposadr[0] + 2] - scene.features()["too_tall"][0]
     assert foot == pytest.approx(scene.world.world_from_shoulder[2] + tool_box.SURFACE_Z), "it still stands"
     scene = Scene(description, "moved_camera")
-    np.testing.assert_allclose(scene.features()["moved_camera"] - scene.before["moved_camera"], MOVED)
+    np.testing.assert_allclose(scene.features()["moved_camera"] - scene.before["moved_camera"], CAMERA_MOVED)
     scene = Scene(description, "covered_opening")
     card = scene.features()["covered_opening"] - scene.world.world_from_shoulder
     np.testing.assert_allclose(card, (scene.opening.x, scene.opening.y, tool_box.SURFACE_Z + 0.001), atol=1e-12)
     np.testing.assert_allclose(scene.before["covered_opening"] - scene.world.world_from_shoulder, CARD_AWAY)
+
+
+@pytest.mark.parametrize(("kind", "height"), [("too_wide", 0.025), ("too_tall", 0.045)])
+def test_an_exchanged_object_stands(description: RobotDescription, kind: Mishap, height: float) -> None:
+    scene = Scene(description, kind)
+    for _ in range(300):
+        scene.world.step()
+    assert scene.world.position(NAME)[2] - tool_box.SURFACE_Z == pytest.approx(height, abs=1e-4)
 
 
 def test_the_hand_brings_it_out_of_reach_or_stays(description: RobotDescription) -> None:

@@ -84,7 +84,10 @@ class Applying(Stage):
             return
         self._object, self._source, self._attempt = name, place, 0
         if name in self.app.table.twins:
-            self._ask_for_help(f"I see more than one {name} object.", please="Please leave one of them")
+            self._ask_for_help(
+                f"I see more than one {name} object.", please="Please leave one of them, and point again"
+            )
+            self.go("waiting")  # the one that is left may not move
             return
         self.app.speak(f"You point at {name} at {cm(place)}: it belongs to the opening at {cm(self.app.rules[name])}.")
         self.go("letting_hand_leave")
