@@ -364,6 +364,22 @@ def test_another_one_is_asked_for_in_place_of_an_object_of_unfit_size() -> None:
     assert f"{reason}. Please stand another one there." in story.sentences()
 
 
+def test_what_a_person_puts_in_is_put_away() -> None:
+    story = Story()
+    story.answers[Speech.REQUEST_POINT_AT_OBJECT] = lambda _: None
+    story.run_to(APPLY)
+    story.run(3.0)
+    assert "is put away" not in story.sentences(), "those that were shown vanished there, too"
+    for name, place in PLACES.items():
+        story.stand(name, place)
+    story.run(1.0)
+    story.vanish("green", PLACES["green"])
+    story.vanish("yellow", OPENINGS["yellow"])
+    story.run(3.0)
+    assert [name for name in PLACES if f"{name} is put away." in story.sentences()] == ["yellow"]
+    assert story.relocations() == []
+
+
 def test_an_object_that_stands_on_its_opening_twice_finds_it_covered() -> None:
     story = Story()
     first = next(iter(OPENINGS))

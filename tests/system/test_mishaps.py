@@ -22,7 +22,7 @@ SAID = {
     ("robot", "seed", "mishaps"),
     [
         ("koch_v1_1", 7, ("out_of_reach", "two_of_one_colour", "too_wide")),
-        ("open_manipulator_x", 7, ("too_tall", "covered_opening", "hand_in_the_way")),
+        ("open_manipulator_x", 7, ("covered_opening", "too_tall", "hand_in_the_way")),
         ("koch_v1_1", 6, ("slippery", "moved_camera")),
         ("open_manipulator_x", 6, ("moved_base",)),
     ],

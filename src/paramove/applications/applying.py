@@ -6,8 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from paramove.applications.learning import GONE_FOR_GOOD_S
 from paramove.applications.options import Place
 from paramove.applications.stage import ApplicationState, Stage, cm
+from paramove.applications.table import AT_REST
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
@@ -17,6 +19,8 @@ NEAR = 0.035
 CLEARER_BY = 0.015
 """The second nearest object must be so much farther away, m."""
 HAND_AWAY_S = 0.3
+INTO_OPENING = 0.02
+"""Maximum distance from its opening, m, of an object that vanishes into it."""
 OVER_OPENING = 0.012
 """Maximum distance from its opening, m, of an object that should have sunk into it."""
 HELPED_IN_VAIN = 2
@@ -42,6 +46,8 @@ class Applying(Stage):
         self._moved: set[str] = set()
         self._to_move = ""
         self._in_vain = 0
+        self._told_twins: set[str] = set()
+        self._stood: set[str] = set()
 
     def enter(self) -> None:
         """Ask the instructor to point."""
@@ -49,6 +55,8 @@ class Applying(Stage):
 
     def on_gesture(self, gesture: Gesture) -> None:
         """Store the target while waiting for one."""
+        if gesture.kind in AT_REST:
+            self._stood.add(gesture.object)
         if gesture.kind != Gesture.KIND_POINTED_AT or self.state != "waiting":
             return
         if self.app.options.pointing == "nearness":
@@ -73,9 +81,26 @@ class Applying(Stage):
         self.app.speak("Please point at the object that I shall put away.", Speech.REQUEST_POINT_AT_OBJECT)
         self.go("waiting")
 
-    def _waiting(self) -> None:
+    def _waiting(self) -> ApplicationStage.Stage | None:
+        for name in sorted(self._stood - self.app.done):
+            if self._was_put_in(name):
+                self._object = name
+                return self._put_away()
+        twins = set(self.app.table.standing()) & self.app.table.twins
+        if twins - self._told_twins:
+            self._ask_to_leave_one(min(twins - self._told_twins))
+        self._told_twins &= twins
         if self.for_s > self.app.options.ask_again_s:
             self._ask()
+        return None
+
+    def _was_put_in(self, name: str) -> bool:
+        """Whether somebody has put it into its opening."""
+        sighting, place = self.app.table.objects[name], self.app.rules.get(name)
+        if sighting.kind != Gesture.KIND_VANISHED or sighting.position is None or place is None:
+            return False
+        gone = self.app.now_s - sighting.time_s > GONE_FOR_GOOD_S and not self.app.table.hand_in_view
+        return gone and math.dist(sighting.position, place) < INTO_OPENING
 
     def _pointed_at(self, name: str) -> None:
         place = self.app.table.standing().get(name)
@@ -84,13 +109,16 @@ class Applying(Stage):
             return
         self._object, self._source, self._attempt = name, place, 0
         if name in self.app.table.twins:
-            self._ask_for_help(
-                f"I see more than one {name} object.", please="Please leave one of them, and point again"
-            )
-            self.go("waiting")  # the one that is left may not move
+            self._ask_to_leave_one(name)
             return
         self.app.speak(f"You point at {name} at {cm(place)}: it belongs to the opening at {cm(self.app.rules[name])}.")
         self.go("letting_hand_leave")
+
+    def _ask_to_leave_one(self, name: str) -> None:
+        self._object = name
+        self._told_twins.add(name)
+        self._ask_for_help(f"I see more than one {name} object.", please="Please leave one of them, and point again")
+        self.go("waiting")  # the one that is left may not move
 
     def _pointed_at_position(self, gesture: Gesture) -> None:
         """Take the object at rest there. Targets off the table, or while objects are being arranged, are ignored."""
