@@ -12,7 +12,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # One more than processors, up to four: a third of the time tests wait, for arms that move in real time and for each other.
 WORKERS := $(shell n=$$(getconf _NPROCESSORS_ONLN); echo $$((n < 4 ? n + 1 : 4)))
 
-.PHONY: help wheel demo test test-hardware check docs results ci format setup messages lock benchmark-seeds coverage mutation bare clean
+.PHONY: help wheel demo test test-long test-hardware check docs results ci format setup messages lock benchmark-seeds coverage mutation bare clean
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -20,8 +20,11 @@ help: ## this list
 demo: setup ## the robot learns where three objects belong and tidies them up, in simulation
 	@$(BIN)/paramove launch rule_learning $(ARGS)
 
-test: setup ## all tests that need no hardware, several at once
-	@$(ONE_THREAD) $(BIN)/python -m pytest -m "not hardware" -n $(WORKERS) --dist worksteal $(ARGS)
+test: setup ## all tests that need neither hardware nor minutes each, several at once
+	@$(ONE_THREAD) $(BIN)/python -m pytest -m "not hardware and not long" -n $(WORKERS) --dist worksteal $(ARGS)
+
+test-long: setup ## tests that take minutes each: everything that can go wrong at the table, in the running demo
+	@$(ONE_THREAD) $(BIN)/python -m pytest -m long $(ARGS)
 
 test-hardware: setup ## tests of a real servo arm, which moves a little: make test-hardware PORT=/dev/serial/by-id/… ROBOT=koch_v1_1
 	@test -n "$(PORT)" || { echo "which port? make test-hardware PORT=/dev/serial/by-id/…" >&2; exit 2; }

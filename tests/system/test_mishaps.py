@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 SAID = {
     "hand_in_the_way": "I wait, as I see a hand",
     "out_of_reach": "I cannot reach",
@@ -24,7 +24,7 @@ SAID = {
         ("koch_v1_1", 7, ("out_of_reach", "two_of_one_colour", "too_wide")),
         ("open_manipulator_x", 7, ("covered_opening", "too_tall", "hand_in_the_way")),
         ("koch_v1_1", 6, ("slippery", "moved_camera")),
-        ("open_manipulator_x", 6, ("moved_base",)),
+        ("koch_v1_1", 8, ("slippery", "moved_base")),
     ],
 )
 def test_what_goes_wrong_is_said_and_ends_well(launcher, robot, seed, mishaps):

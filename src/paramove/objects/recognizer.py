@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
-from paramove.objects.full_size import FullSize
+from paramove.objects.full_size import FullSize, Size
 from paramove.objects.homography import PlaneHomography
 from paramove.objects.object_motion import MotionThresholds, ObjectMotion, State, Transition
 from paramove.objects.openings import OpeningTracker
@@ -159,16 +159,20 @@ class Recognizer:
         Its region is as high as its axis, foreshortened, and the circles at its ends, to where they are half as wide.
         A lean changes neither its area nor its height.
         """
-        full = self._full_size.expected(gesture.object, gesture.u_px, gesture.v_px)
-        if full is None:
+        motion = self._objects[gesture.object]
+        if motion.state is State.RESTING and motion.position is not None:
+            seen: Size | None = motion.position.size  # it may have been exchanged
+        else:
+            seen = self._full_size.expected(gesture.object, gesture.u_px, gesture.v_px)
+        if seen is None:
             return 0.0, 0.0
-        slant = math.hypot(1.0, full.lean)
-        across_px = full.area_px / full.height_px
+        slant = math.hypot(1.0, seen.lean)
+        across_px = seen.area_px / seen.height_px
         sides = (gesture.u_px - across_px / slant / 2, gesture.u_px + across_px / slant / 2)
         width = math.dist(*(homography.plane_from_image(side, gesture.v_px) for side in sides))
         ends_px = math.sqrt(3) / 2 * homography.foreshortening(gesture.u_px, gesture.v_px) * across_px
         sine = min(homography.sine_of_elevation(gesture.u_px, gesture.v_px), MAX_SINE)
-        axis_px = slant * max(0.0, full.height_px - ends_px)
+        axis_px = slant * max(0.0, seen.height_px - ends_px)
         return width, axis_px * width / (across_px / slant * math.sqrt(1.0 - sine**2))
 
     def _put_over_opening(self, gesture: Gesture, homography: PlaneHomography) -> None:
