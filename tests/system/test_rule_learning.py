@@ -20,7 +20,7 @@ def test_robot_learns_the_rules_and_applies_them(launcher):
     assert truth["deepest_penetration_mm"] <= 0.7, truth
 
 
-@pytest.mark.slow(minutes=5)
+@pytest.mark.long
 def test_a_person_rehearses_with_a_servo_arm_in_real_time(launcher):
     """What the tutorial says to type; nothing of the robot knows that arm and camera are simulated."""
     rehearse, enable = [block.commands[0] for block in blocks(TEACH_RULES) if block.remark == "rehearsed by a test"]
