@@ -127,17 +127,18 @@ def _tasks_in(folder: Path) -> list[dict[str, Any]]:
 def _write_report(folder: Path, results: Sequence[TaskResult], picture: Path, video: Path | None) -> Path:
     good = sum(one.good for one in results)
     rows = [
-        [one.task, one.thing or "hand", _metres(one.wanted), _metres(one.found), f"{1e3 * one.error:.1f}",
+        [one.task, one.thing or "hand", _metres(one.wanted), f"{1e3 * one.error:.1f}",
          "good" if one.good else "too far"]
         for one in results
     ]  # fmt: skip
-    title = "Tasks of a servo arm"
+    robot = robot_in(folder)
+    title = f"Tasks of {'a servo arm' if robot is None else robot.name}"
     parts = [
         film(video),
         section(
             "Numbers", f"A hand within {1e3 * REACHED_M:.0f} mm of its target and an object within "
             f"{1e3 * PLACED_M:.0f} mm count as there.",
-            table(["task", "what", "wanted", "found", "error, mm", ""], rows, numbers=(4,)),
+            table(["task", "what", "to", "error, mm", ""], rows, numbers=(3,)),
         ),
         section("Paths", "Crosses are targets.", image(picture.read_bytes(), "paths of the hand and the objects")),
     ]  # fmt: skip
