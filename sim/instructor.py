@@ -174,7 +174,7 @@ class Instructor(Person):
         ]
         yield from self.hand.pick_up(name)
         if self._mishaps is not None:
-            self._mishaps.mend()
+            self._mishaps.fix()
         yield from self.hand.stand_at(tool_box.standing_centre(*places.draw_place(self._places, others)))
         yield from self.withdraw()
 

@@ -54,7 +54,7 @@ class Mishaps:
         self._world, self._rules = world, rules
         self._left = list(kinds)
         self._struck: set[str] = set()
-        self._mends: list[Callable[[], None]] = []
+        self._fixes: list[Callable[[], None]] = []
         self.lingers_s = 0.0
         self.base_moved = np.zeros(3)
 
@@ -77,10 +77,10 @@ class Mishaps:
         else:
             self._change(kind, name)
 
-    def mend(self) -> None:
+    def fix(self) -> None:
         """The robot has asked for help: what a person can put right is right again."""
-        while self._mends:
-            self._mends.pop()()
+        while self._fixes:
+            self._fixes.pop()()
 
     def _change(self, kind: Mishap, name: str) -> None:
         """An object is exchanged for another one."""
@@ -122,10 +122,10 @@ class Mishaps:
             self.base_moved = BASE_MOVED
 
     def _set(self, array: Floats, row: int, value: ArrayLike) -> None:
-        """Until it is mended."""
+        """Until it is fixed."""
         before = np.copy(array[row])
         array[row] = value
-        self._mends.append(lambda: array.__setitem__(row, before))
+        self._fixes.append(lambda: array.__setitem__(row, before))
 
 
 def add_card(spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:

@@ -20,7 +20,6 @@ def pytest_collection():
 
 def pytest_collection_modifyitems(items):
     """The long ones come first, whole systems before all: at the end no processor waits for the last of them."""
-
     items.sort(key=lambda item: (item.get_closest_marker("slow") is None, "system" not in item.path.parts))
 
 

@@ -58,7 +58,7 @@ CHANGES = [kind for kind in MISHAPS if kind not in ("hand_in_the_way", "out_of_r
 def test_one_thing_changes_and_a_person_who_helps_puts_it_right(description: RobotDescription, kind: Mishap) -> None:
     scene = Scene(description, kind)
     assert scene.changed() == [kind]
-    scene.mishaps.mend()
+    scene.mishaps.fix()
     assert scene.changed() == ([kind] if kind.startswith("moved") else []), "nobody knows where camera and base were"
 
 

@@ -1,4 +1,4 @@
-"""What goes wrong at the table in rule learning: the robot says so, does nothing unsafe, and finishes its task."""
+"""What goes wrong at the table in rule learning: the robot reports it, does nothing unsafe, and finishes its task."""
 
 import json
 

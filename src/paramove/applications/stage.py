@@ -13,7 +13,7 @@ from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 
 REMIND_S = 6.0
-"""The robot says for what it waits if the hand stays for so long."""
+"""The robot reports what it waits for if the hand stays for so long."""
 
 _log = logging.getLogger(__name__)
 

@@ -13,7 +13,7 @@ from paramove.documents import Image
 
 
 class GraphicsError(RuntimeError):
-    """Nothing can be rendered on this machine as it is; the text says what to install or set."""
+    """Nothing can be rendered on this machine as it is; the text names what to install or set."""
 
 
 class Eye:

@@ -97,7 +97,7 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
     video = None
     if robot is not None and not options.no_video:
         video = write_film(folder, RobotDescription.load(robot), states, console)
-    report = _write_report(folder, results, picture, video)
+    report = _write_report(folder, "a servo arm" if robot is None else robot.name, results, picture, video)
     for path in (report, picture, *([] if video is None else [video]), numbers):
         console.print(f"{path.name:16s} {path}", markup=False, soft_wrap=True)
     return success
@@ -124,15 +124,14 @@ def _tasks_in(folder: Path) -> list[dict[str, Any]]:
         raise RunFolderError(f"{path} has no tasks of the run ({error!r})") from error
 
 
-def _write_report(folder: Path, results: Sequence[TaskResult], picture: Path, video: Path | None) -> Path:
+def _write_report(folder: Path, robot: str, results: Sequence[TaskResult], picture: Path, video: Path | None) -> Path:
     good = sum(one.good for one in results)
     rows = [
         [one.task, one.thing or "hand", _metres(one.wanted), f"{1e3 * one.error:.1f}",
          "good" if one.good else "too far"]
         for one in results
     ]  # fmt: skip
-    robot = robot_in(folder)
-    title = f"Tasks of {'a servo arm' if robot is None else robot.name}"
+    title = f"Tasks of {robot}"
     parts = [
         film(video),
         section(
