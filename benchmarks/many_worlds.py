@@ -18,7 +18,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -95,7 +95,7 @@ class View:
             if "blue" not in detected:
                 return faults
             image.append((detected["blue"].u_px, detected["blue"].v_px))
-        self.calibration = PlaneHomography.fit(image, CORNERS, GRASP_Z).to_message()
+        self.calibration = replace(PlaneHomography.fit(image, CORNERS, GRASP_Z), object_name="blue").to_message()
         return faults
 
     def show_rule(self, name: str, start: Floats) -> Floats | None:
@@ -134,8 +134,8 @@ class View:
         return np.array((vanished[-1].x, vanished[-1].y)) if vanished else None
 
     def stand(self, name: str, position: np.ndarray[Any, Any] | tuple[float, float]) -> None:
-        """Stand a cylinder at a position of the working plane."""
-        self.world.place(name, tool_box.standing_centre(*position))
+        """Stand an object at a position of the working plane."""
+        self.world.place(name, tool_box.standing_centre(position[0], position[1], self.world.shapes[name].half_height))
 
     def park(self) -> None:
         """All cylinders out of sight."""

@@ -97,6 +97,12 @@ class Hand:
         rise = TRAVEL_Z - self._table.position(name)[2] if lift is None else lift
         yield self.move(raised(self.fingertip, max(0.0, rise)), seconds=(0.6, 1.0), straight=True, upright=True)
 
+    def over(self, point: Floats, height: float) -> Floats:
+        """Fingertip when the centre of what is held is `height` over `point`."""
+        held = self._table.held_by_instructor
+        assert held is not None
+        return raised(point, height + self._table.shapes[held].half_height)
+
     def put_down(self) -> Script:
         """Let go of what is held and raise the hand."""
         yield Step(0.1)
@@ -106,15 +112,15 @@ class Hand:
 
     def stand_at(self, centre: Floats) -> Script:
         """Carry what is held to where its centre is to be, and let go."""
-        yield self.move(tip_over(centre, TRAVEL_Z - centre[2]), seconds=(1.2, 2.6))
-        yield self.move(tip_over(centre, 0.0005), seconds=(0.7, 1.0), straight=True)
+        yield self.move(self.over(centre, TRAVEL_Z - centre[2]), seconds=(1.2, 2.6))
+        yield self.move(self.over(centre, 0.0005), seconds=(0.7, 1.0), straight=True)
         yield Step(0.3)
         yield from self.put_down()
 
     def bring(self, name: str, place: Floats) -> Script:
         """Fetch a cylinder from wherever it is and stand it at `place` [2] on the working plane."""
         yield from self.pick_up(name)
-        yield from self.stand_at(tool_box.standing_centre(*place))
+        yield from self.stand_at(tool_box.standing_centre(place[0], place[1], self._table.shapes[name].half_height))
 
     def park(self, name: str) -> Script:
         """Carry what is held to its place out of sight."""
@@ -128,8 +134,3 @@ class Hand:
 def raised(point: Floats, height: float) -> Floats:
     """The point so far above another one."""
     return np.asarray(point + np.array((0.0, 0.0, height)))
-
-
-def tip_over(point: Floats, height: float) -> Floats:
-    """Fingertip when the held cylinder's centre is `height` over `point`."""
-    return raised(point, height + tool_box.CYLINDER_HALF_HEIGHT)

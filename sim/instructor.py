@@ -10,7 +10,7 @@ from paramove.documents import Floats
 from paramove.msgs.rule_pb2 import Speech
 from sim import places, tool_box
 from sim.arm import Arm
-from sim.hand import Hand, Script, Step, tip_over
+from sim.hand import Hand, Script, Step
 from sim.hand_path import minimum_jerk
 from sim.mishaps import Mishaps
 from sim.person import Person
@@ -175,7 +175,8 @@ class Instructor(Person):
         yield from self.hand.pick_up(name)
         if self._mishaps is not None:
             self._mishaps.fix()
-        yield from self.hand.stand_at(tool_box.standing_centre(*places.draw_place(self._places, others)))
+        place, half_height = places.draw_place(self._places, others), self.table.shapes[name].half_height
+        yield from self.hand.stand_at(tool_box.standing_centre(place[0], place[1], half_height))
         yield from self.withdraw()
 
     # -- parts of scripts -------------------------------------------------------------------------------------------
@@ -190,10 +191,9 @@ class Instructor(Person):
         opening = self._opening[name]
         yield from self.hand.pick_up(name, lift=SHOWN_LIFT + self._paths.uniform(-0.003, 0.005))
         target = opening.centre + np.array((*self._paths.normal(0.0, 0.001, 2), 0.0))
-        height = tool_box.CYLINDER_HALF_HEIGHT + SHOWN_LIFT
-        yield self.hand.move(tip_over(target, height), seconds=(1.0, 2.2), rise=False)
-        inside = tool_box.CYLINDER_HALF_HEIGHT - 0.010
-        yield self.hand.move(tip_over(target, inside), seconds=(0.8, 1.2), straight=True)
+        half_height = self.table.shapes[name].half_height
+        yield self.hand.move(self.hand.over(target, half_height + SHOWN_LIFT), seconds=(1.0, 2.2), rise=False)
+        yield self.hand.move(self.hand.over(target, half_height - 0.010), seconds=(0.8, 1.2), straight=True)
         yield from self.hand.put_down()
         yield from self.withdraw()
         yield Step(1.5)
@@ -250,7 +250,7 @@ class Instructor(Person):
         centre = gripper + ASIDE_IN_HAND * rotation[:, 1] + AHEAD_IN_HAND * rotation[:, 0]
         centre[:2] += self._paths.normal(0.0, 0.0007, 2)
         centre[2] = gripper[2] - self._paths.uniform(0.009, 0.011)
-        return tip_over(centre, above)
+        return self.hand.over(centre, above)
 
     # -- what to take next --------------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ import numpy as np
 from paramove.documents import Floats
 from sim import tool_box
 
-PURPOSES = ("camera", "light", "noise", "rules", "places", "order", "paths", "gaps")
+PURPOSES = ("camera", "light", "noise", "rules", "places", "order", "paths", "gaps", "turns")
 WIDTH_PX, HEIGHT_PX = 480, 360
 FOCAL_PX = 600.0
 LOOK_AT = (0.155, -0.015, tool_box.SURFACE_Z)  # shoulder frame
@@ -72,6 +72,7 @@ class Looks:
         camera: See `Camera`.
         pixel_noise: Standard deviation, of 255.
         rules: Colour -> name of its opening.
+        turns: Colour -> how a block is turned about its upright axis at first, rad; a cylinder looks the same anyway.
         measures: Of the tool box, and of the nominal camera.
     """
 
@@ -80,6 +81,7 @@ class Looks:
     camera: Camera
     pixel_noise: float
     rules: dict[str, str]
+    turns: dict[str, float]
     measures: tool_box.Measures
 
     @classmethod
@@ -96,6 +98,7 @@ class Looks:
             rules={
                 colour: tool_box.OPENINGS[place].name for colour, place in zip(tool_box.COLOURS, places, strict=True)
             },
+            turns=dict(zip(tool_box.COLOURS, draw["turns"].uniform(0.0, np.pi / 2, 3).tolist(), strict=True)),
             measures=measures,
         )
 

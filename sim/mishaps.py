@@ -93,12 +93,11 @@ class Mishaps:
             other = next(one for one in tool_box.COLOURS if one not in self._struck)
             self._set(model.geom_rgba, model.geom(other).id, model.geom_rgba[geom.id].copy())
         else:
-            radius, half_height, _ = geom.size
-            wide = kind == "too_wide"
-            self._set(
-                model.geom_size, geom.id, (2.2 * radius if wide else radius, half_height * (1 if wide else 1.8), 0)
-            )
-            self._set(model.geom_rbound, geom.id, 2.2 * float(np.hypot(radius, half_height)))
+            wide, factors, half_height = kind == "too_wide", np.ones(3), self._world.shapes[name].half_height
+            upright = 2 if geom.size[2] > 0 else 1  # MuJoCo's order: a block's width twice, a cylinder's radius
+            factors[slice(upright) if wide else upright] = 2.2 if wide else 1.8
+            self._set(model.geom_size, geom.id, factors * geom.size)
+            self._set(model.geom_rbound, geom.id, 2.2 * model.geom_rbound[geom.id])
             self._set(model.geom_aabb, geom.id, 2.2 * model.geom_aabb[geom.id])
             bounds = model.body_bvhadr[geom.bodyid[0]]
             self._set(model.bvh_aabb, bounds, 2.2 * model.bvh_aabb[bounds])

@@ -36,7 +36,7 @@ class Mount:
         base: Origin of the frame of the robot's goals in the world, [3], m.
         gripper: Site of the end effector. root: the robot's first body.
         sides: Name of a geom or body -> side of the hand that it is part of; an object is held between two.
-        object_radius: Of the objects, which its gripper can hold and feel, m.
+        object_width: Of the objects, which its gripper can hold and feel, m.
         table_edge: x of the table's near edge, frame of the tool box's measures, m: a servo arm stands on it.
     """
 
@@ -46,7 +46,7 @@ class Mount:
     gripper: str
     root: str
     sides: Mapping[str, str]
-    object_radius: float = tool_box.CYLINDER_RADIUS
+    object_width: float = 2 * tool_box.CYLINDER_RADIUS
     table_edge: float = tool_box.X_RANGE[0] - 0.005
 
     @classmethod
@@ -59,9 +59,9 @@ class Mount:
         bodies = [hand, *(body for body in hand.bodies if body.geoms)]
         sides = {body.name: body.name for body in bodies}
         root = spec.worldbody.first_body().name
-        radius = 0.5 * float(np.clip(OBJECT_WIDTH, *description.chain.object_width))
+        width = float(np.clip(OBJECT_WIDTH, *description.chain.object_width))
         gripper = description.chain.sites.end_effector
-        return cls(description, -ARM_IN_SHOULDER, np.zeros(3), gripper, root, sides, radius, ARM_IN_SHOULDER[0] - 0.14)
+        return cls(description, -ARM_IN_SHOULDER, np.zeros(3), gripper, root, sides, width, ARM_IN_SHOULDER[0] - 0.14)
 
     def add_stand(self, spec: mujoco.MjSpec, look: tuple[float, ...]) -> None:
         """The block under a servo arm; HOAP-3 stands behind the table."""

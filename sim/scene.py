@@ -1,11 +1,11 @@
-"""Builds the MuJoCo model: the robot at its tool box, three cylinders, the instructor's hand, lights and cameras.
+"""Builds the MuJoCo model: the robot at its tool box, three objects, the instructor's hand, lights and cameras.
 
 World frame: the torso frame of the robot's model. The files of the robot are taken as they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -74,8 +74,7 @@ def build(
     _add_lights(spec, world_looks.brightness)
     _add_surroundings(spec, world_from_shoulder, mount.table_edge)
     _add_box(spec, world_from_shoulder, world_looks.measures)
-    width = world_looks.measures.object_width
-    _add_cylinders(spec, world_from_shoulder, mount.object_radius if width is None else width / 2)
+    _add_objects(spec, world_from_shoulder, world_looks.measures.shapes(mount.object_width))
     _add_hand(spec, world_from_shoulder)
     _add_cameras(spec, world_looks, world_from_shoulder)
     for furnish in furnishings:
@@ -253,15 +252,20 @@ def _add_surface(
     )
 
 
-def _add_cylinders(spec: mujoco.MjSpec, world_from_shoulder: Floats, radius: float) -> None:
-    for colour, place in zip(tool_box.COLOURS, places.PARKED, strict=True):
+def _add_objects(spec: mujoco.MjSpec, world_from_shoulder: Floats, shapes: Mapping[str, tool_box.Shape]) -> None:
+    for (colour, shape), place in zip(shapes.items(), places.PARKED, strict=True):
+        kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, (shape.half_width, shape.half_height, 0.0)
+        if shape.kind == "block":
+            kind, size = mujoco.mjtGeom.mjGEOM_BOX, (shape.half_width, shape.half_width, shape.half_height)
+        wider = shape.half_width / tool_box.CYLINDER_RADIUS
+        taller = shape.half_height / tool_box.CYLINDER_HALF_HEIGHT
         body = spec.worldbody.add_body(name=colour, pos=world_from_shoulder + place)
         body.add_freejoint(name=colour)
         body.add_geom(
             name=colour,
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            size=(radius, tool_box.CYLINDER_HALF_HEIGHT, 0.0),
-            mass=tool_box.CYLINDER_MASS * (radius / tool_box.CYLINDER_RADIUS) ** 2,
+            type=kind,
+            size=size,
+            mass=tool_box.CYLINDER_MASS * wider**2 * taller,
             rgba=RGBA[colour],
             friction=OBJECT_FRICTION,
             solref=SOLREF,

@@ -85,7 +85,7 @@ def at_the_tool_box(
         cameras.append(tracked.images(world, options.arm_image_every))
     person: Person
     if options.scene == "relocate_by_pointing":
-        world.place(OBJECT, tool_box.standing_centre(*START))
+        world.place(OBJECT, tool_box.standing_centre(*START, world.shapes[OBJECT].half_height))
         person = PlaceInstructor(world, draws, tracked.body, tracked.pointing)
     else:
         person = Instructor(world, world_looks.rules, draws, tracked.body, tracked.pointing, mishaps)

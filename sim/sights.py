@@ -8,7 +8,7 @@ import numpy as np
 
 from paramove.documents import Floats
 from sim import places, tool_box
-from sim.tool_box import Opening
+from sim.tool_box import Opening, Shape
 
 POINTING = np.array((0.84, -0.38, 0.38))  # backward direction of the pointing hand: its owner sits at the far side
 
@@ -17,6 +17,7 @@ class Table(Protocol):
     """What the instructor sees and moves; `sim.world.World` is one. Right shoulder's frame."""
 
     held_by_instructor: str | None
+    shapes: dict[str, Shape]
 
     def position(self, name: str) -> Floats: ...
     def gripper(self) -> tuple[Floats, Floats]: ...
@@ -40,10 +41,6 @@ class Sights:
         self._table = table
         self._opening = openings
 
-    def _height_over(self, centre: Floats) -> float:
-        """How far a centre lies over that of a cylinder that stands on the working plane."""
-        return float(centre[2] - tool_box.SURFACE_Z - tool_box.CYLINDER_HALF_HEIGHT)
-
     def stands(self, name: str) -> bool:
         """Whether the cylinder is on the working plane (standing or lying), not in a compartment and not parked."""
         centre = self._table.position(name)
@@ -51,7 +48,7 @@ class Sights:
             low <= value <= high
             for value, (low, high) in zip(centre, (tool_box.X_RANGE, tool_box.Y_RANGE), strict=False)
         )
-        return over_box and centre[2] > tool_box.SURFACE_Z + 0.5 * tool_box.CYLINDER_RADIUS
+        return over_box and centre[2] > tool_box.SURFACE_Z + 0.5 * self._table.shapes[name].half_width
 
     def in_compartment(self, name: str) -> bool:
         """Whether the cylinder is in any opening."""
@@ -69,19 +66,20 @@ class Sights:
         """Whether the cylinder is in its own opening, wholly below the working plane."""
         centre, opening = self._table.position(name), self._opening[name]
         near = np.hypot(centre[0] - opening.x, centre[1] - opening.y) < tool_box.OPENING_RADIUS
-        return bool(near and centre[2] + tool_box.CYLINDER_HALF_HEIGHT < tool_box.SURFACE_Z)
+        return bool(near and centre[2] + self._table.shapes[name].half_height < tool_box.SURFACE_Z)
 
     def top_of(self, name: str) -> Floats:
         """Fingertip on top of a cylinder, standing or lying."""
-        centre = self._table.position(name)
-        standing = abs(self._height_over(centre)) < 0.004 or self.is_parked(name) or self.in_compartment(name)
-        over = tool_box.CYLINDER_HALF_HEIGHT if standing else tool_box.CYLINDER_RADIUS
+        centre, shape = self._table.position(name), self._table.shapes[name]
+        on_plane = abs(centre[2] - tool_box.SURFACE_Z - shape.half_height) < 0.004
+        standing = on_plane or self.is_parked(name) or self.in_compartment(name)
+        over = shape.half_height if standing else shape.half_width
         return np.asarray(centre + np.array((0.0, 0.0, over)))
 
     def pointing_pose(self, name: str, draw: np.random.Generator) -> tuple[Floats, Floats]:
         """Fingertip next to the upper third of a cylinder, on the camera's side, as far as possible from the others."""
-        centre = self._table.position(name)
-        distance = tool_box.CYLINDER_RADIUS + 0.0075 + draw.uniform(0.008, 0.012)
+        centre, shape = self._table.position(name), self._table.shapes[name]
+        distance = shape.half_width + 0.0075 + draw.uniform(0.008, 0.012)
         others = [self._table.position(other)[:2] for other in tool_box.COLOURS if other != name]
         best, best_gap = np.zeros(3), -1.0
         for azimuth in np.deg2rad(np.arange(-50.0, -27.0, 4.0)):
@@ -90,5 +88,5 @@ class Sights:
             if gap > best_gap:
                 best, best_gap = ahead, gap
         fingertip = centre + distance * best
-        fingertip[2] = tool_box.SURFACE_Z + 2 * tool_box.CYLINDER_HALF_HEIGHT * draw.uniform(0.66, 0.80)
+        fingertip[2] = tool_box.SURFACE_Z + 2 * shape.half_height * draw.uniform(0.66, 0.80)
         return fingertip, POINTING

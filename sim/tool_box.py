@@ -7,6 +7,7 @@ box turns about the x axis through its centre and is equally high either way up.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -40,6 +41,19 @@ HALF_SIZE = (
 CENTRE = (sum(X_RANGE) / 2, sum(Y_RANGE) / 2, SURFACE_Z - THICKNESS / 2)
 
 
+T = TypeVar("T")
+ShapeKind = Literal["cylinder", "block"]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Of an object, m."""
+
+    kind: ShapeKind
+    half_width: float
+    half_height: float
+
+
 @dataclass(frozen=True)
 class Measures:
     """Measures that differ between worlds; no node knows them.
@@ -48,13 +62,17 @@ class Measures:
         camera_elevation_deg: Above the working plane. From above 52 degrees, a cylinder in its compartment can be seen.
         opening_radius: Free radius of every opening, m, above a cylinder's.
         chamfer: Height and width of the openings' chamfer, m.
-        object_width: Of the cylinders, m; None: as it suits the robot's gripper.
+        object_width: Of the objects, or of each in the order of `COLOURS`, m; None: as it suits the robot's gripper.
+        object_height: Of all or each of them, m; less than a compartment is deep.
+        object_shape: Of all or each of them. A block has a square foot: it is a cube if it is as high as wide.
     """
 
     camera_elevation_deg: float = 52.0
     opening_radius: float = OPENING_RADIUS
     chamfer: float = CHAMFER
-    object_width: float | None = None
+    object_width: float | tuple[float, float, float] | None = None
+    object_height: float | tuple[float, float, float] = 2 * CYLINDER_HALF_HEIGHT
+    object_shape: ShapeKind | tuple[ShapeKind, ShapeKind, ShapeKind] = "cylinder"
 
     def __post_init__(self) -> None:
         widest = opening.TILE_HALF
@@ -63,6 +81,19 @@ class Measures:
                 f"openings of radius {self.opening_radius} m with a chamfer of {self.chamfer} m: a radius above "
                 f"{CYLINDER_RADIUS} m, and with the chamfer below {widest} m, expected"
             )
+        if not all(0 < height < COMPARTMENT_DEPTH for height in _of_each(self.object_height)):
+            raise ValueError(f"objects of height {self.object_height} m: less than {COMPARTMENT_DEPTH} m expected")
+
+    def shapes(self, usual_width: float) -> dict[str, Shape]:
+        """Of the objects, by their colours."""
+        kinds: tuple[ShapeKind, ShapeKind, ShapeKind] = _of_each(self.object_shape)
+        widths = _of_each(usual_width if self.object_width is None else self.object_width)
+        each = zip(COLOURS, kinds, widths, _of_each(self.object_height), strict=True)
+        return {colour: Shape(kind, width / 2, height / 2) for colour, kind, width, height in each}
+
+
+def _of_each(value: T | tuple[T, T, T]) -> tuple[T, T, T]:
+    return value if isinstance(value, tuple) else (value, value, value)
 
 
 NOMINAL = Measures()
@@ -87,6 +118,6 @@ class Opening:
 OPENINGS = tuple(Opening(f"opening_{place}", OPENING_X, y) for place, y in enumerate(OPENING_Y))
 
 
-def standing_centre(x: float, y: float) -> Floats:
-    """Centre of a cylinder that stands on the working plane at (x, y), [3], shoulder frame."""
-    return np.array((x, y, SURFACE_Z + CYLINDER_HALF_HEIGHT))
+def standing_centre(x: float, y: float, half_height: float = CYLINDER_HALF_HEIGHT) -> Floats:
+    """Centre of an object that stands on the working plane at (x, y), [3], shoulder frame."""
+    return np.array((x, y, SURFACE_Z + half_height))

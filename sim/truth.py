@@ -42,6 +42,8 @@ def layout(looks: Looks, world: World, world_from_table: Floats | None) -> Truth
         message.openings.add(name=item.name, x=x, y=y, radius=looks.measures.opening_radius)
     for colour, opening in looks.rules.items():
         message.rules.add(object=colour, opening=opening)
+    for colour, shape in world.shapes.items():
+        message.objects.add(name=colour, width=2 * shape.half_width, height=2 * shape.half_height)
     return message
 
 

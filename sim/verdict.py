@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from paramove.msgs.truth_pb2 import TruthBody, TruthLayout, TruthState
-from sim import tool_box
 
 REST_STATES = 15  # one second
 REST_DISTANCE = 0.001  # m, moved at most in that time
@@ -27,6 +26,7 @@ class Verdict:
     def __init__(self, layout: TruthLayout, begun_ns: int = 0) -> None:
         self._layout, self._begun_ns = layout, begun_ns
         self._openings = {item.name: item for item in layout.openings}
+        self._sizes = {item.name: (item.width, item.height) for item in layout.objects}
         self._rules = {rule.object: rule.opening for rule in layout.rules}
         self._recent: deque[TruthState] = deque(maxlen=REST_STATES)
         self._errors_mm: list[float] = []
@@ -99,12 +99,20 @@ class Verdict:
 
     def _opening_of(self, body: TruthBody) -> str:
         """Name of the opening in whose compartment the object is, wholly below the working plane; "" if in none."""
-        if _top_of(body) >= self._layout.surface_z:
+        if self._top_of(body) >= self._layout.surface_z:
             return ""
         for item in self._openings.values():
             if np.hypot(body.x - item.x, body.y - item.y) < item.radius:
                 return str(item.name)
         return ""
+
+    def _top_of(self, body: TruthBody) -> float:
+        """Height of the highest point of a cylinder, m; of a block, if it leans along a side."""
+        width, height = self._sizes[body.name]
+        x, y, _, _ = body.quaternion_xyzw
+        upright = abs(1 - 2 * (x * x + y * y))  # of the axis' z component
+        lying = np.sqrt(max(0.0, 1 - upright**2))
+        return float(body.z + upright * height / 2 + lying * width / 2)
 
     def _at_rest(self, name: str) -> bool:
         if len(self._recent) < REST_STATES:
@@ -112,14 +120,6 @@ class Verdict:
         bodies = [_body(state.objects, name) for state in self._recent]
         points = np.array([(body.x, body.y, body.z) for body in bodies])
         return bool(np.linalg.norm(points - points[-1], axis=1).max() < REST_DISTANCE)
-
-
-def _top_of(body: TruthBody) -> float:
-    """Height of the highest point of a cylinder, m."""
-    x, y, _, _ = body.quaternion_xyzw
-    upright = abs(1 - 2 * (x * x + y * y))  # of the axis' z component
-    lying = np.sqrt(max(0.0, 1 - upright**2))
-    return float(body.z + upright * tool_box.CYLINDER_HALF_HEIGHT + lying * tool_box.CYLINDER_RADIUS)
 
 
 def _body(bodies: Iterable[TruthBody], name: str) -> TruthBody:

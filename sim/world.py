@@ -36,6 +36,9 @@ class World:
         looks: How it looks; lights and cameras are part of the model.
         description: The robot's joints, in the order in which torques come.
         furnishings: Add what else is there.
+
+    Attributes:
+        shapes: Of the objects, by their names.
     """
 
     def __init__(self, looks: Looks, description: RobotDescription, furnishings: Sequence[scene.Furnish] = ()) -> None:
@@ -50,9 +53,11 @@ class World:
         driven = description.joint_names if description.chain is None else ()  # servos bring their own torques
         self._actuators = np.array([model.actuator(name).id for name in driven], dtype=np.intp)
         self._body = {name: model.body(name).id for name in (*tool_box.COLOURS, "box", scene.HAND)}
+        self._turns = looks.turns
         self._mocap = {name: int(model.body_mocapid[self._body[name]]) for name in ("box", scene.HAND)}
         self._weld = {name: model.equality(f"hold_{name}").id for name in tool_box.COLOURS}
         self._gripper = model.site(self.mount.gripper).id
+        self.shapes = looks.measures.shapes(self.mount.object_width)
         self._watch = ContactWatch(model, self.mount.root, self.mount.sides)
         self._warnings = self.data.warning
         self.held_by_instructor: str | None = None
@@ -141,9 +146,10 @@ class World:
         return np.asarray(self.data.xquat[self._body[name]].copy())
 
     def place(self, name: str, centre: Floats) -> None:
-        """Put a cylinder upright at `centre`, at rest: to set a scene, not part of any story."""
-        joint = self.model.joint(name)
-        self.data.qpos[joint.qposadr[0] : joint.qposadr[0] + 7] = (*(centre + self.world_from_shoulder), 1, 0, 0, 0)
+        """Put an object upright at `centre`, at rest: to set a scene, not part of any story."""
+        joint, half = self.model.joint(name), self._turns[name] / 2 if self.shapes[name].kind == "block" else 0.0
+        turn = (math.cos(half), 0.0, 0.0, math.sin(half))
+        self.data.qpos[joint.qposadr[0] : joint.qposadr[0] + 7] = (*(centre + self.world_from_shoulder), *turn)
         self.data.qvel[joint.dofadr[0] : joint.dofadr[0] + 6] = 0.0
 
     # -- instructor -------------------------------------------------------------------------------------------------
@@ -177,10 +183,10 @@ class World:
         if self.held_by_instructor is None or self._grasped is None:
             return
         back = _conjugate(self.data.mocap_quat[self._mocap[scene.HAND]])
-        offset, turn = self._grasped
+        (offset, turn), half_height = self._grasped, self.shapes[self.held_by_instructor].half_height
         upright = _upright_near(_multiply(_conjugate(back), turn))
         goal = _multiply(back, upright)
-        goal_offset = _rotate(back, np.array((0.0, 0.0, -tool_box.CYLINDER_HALF_HEIGHT)))
+        goal_offset = _rotate(back, np.array((0.0, 0.0, -half_height)))
         if goal @ turn < 0:
             goal = -goal
         between = (1 - fraction) * turn + fraction * goal

@@ -177,6 +177,25 @@ def test_an_object_of_another_width_is_grasped_at_its_middle_or_rejected(name: s
 
 
 @each_arm
+@pytest.mark.parametrize(
+    ("height", "attempt", "expected"),
+    [(0.050, 1, 0.036), (0.065, 1, 0.036), (0.035, 1, 0.0252), (0.020, 1, 0.020), (None, 1, 0.036), (None, 2, 0.020)],
+)
+def test_a_low_object_is_grasped_low_and_put_down_as_low(
+    name: str, height: float | None, attempt: int, expected: float
+) -> None:
+    plan, near, far = reaching(name), np.array((0.15, 0.0, 0.036)), np.array((0.15, 0.06, 0.036))
+    fetch = plan.fetch(near, grasp=Grasp(far, attempt, height=height))
+    for motion, phase in (
+        (fetch, "grasp"),
+        (plan.deliver(fetch.end, far), "release"),
+        (plan.home(fetch.end, holding=True), "release"),
+    ):
+        at = motion.gripper[round(dict(motion.phases)[phase] / 0.01)]
+        np.testing.assert_allclose(at[2], expected, rtol=0, atol=1e-4)
+
+
+@each_arm
 def test_begins_wherever_the_arm_is(name: str) -> None:
     plan, oracle = reaching(name), Oracle(name)
     start = plan.reach((0.10, -0.14, 0.05)).angles[-1]

@@ -64,6 +64,17 @@ def test_a_circle_is_foreshortened_by_the_sine_of_the_elevation(elevation_deg: f
     assert rolled.sine_of_elevation(240, 180) == pytest.approx(sine, rel=0.002)
 
 
+@pytest.mark.parametrize("roll_deg", [-20.0, 0.0, 30.0])
+def test_what_lies_below_the_plane_is_farther_away(roll_deg: float) -> None:
+    scene = Scene(Look(camera_turn_deg=(0.0, 0.0, roll_deg)))
+    scene.close()
+    homography = PlaneHomography.fit([scene.project(np.array([x, y, 0.025])) for x, y in CORNERS], CORNERS)
+    for x, y in _grid():
+        for depth in (-0.010, 0.015):
+            u, v = scene.project(np.array([x, y, 0.025 - depth]))
+            assert np.hypot(*(np.array(homography.below_plane(u, v, depth)) - (x, y))) < 0.0015
+
+
 @pytest.mark.parametrize(
     ("image", "plane", "words"),
     [

@@ -1,9 +1,12 @@
 """From rendered images to gestures: the instructor shows a rule and points (thesis 5.2.6, steps 3 and 4)."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from benchmarks.many_worlds import RESTS, View, tolerance
+from paramove.motion.plans import HEIGHT_ERROR_M
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.robots.description import RobotDescription
 from sim import tool_box
@@ -87,5 +90,42 @@ def test_rules_hold_whatever_camera_and_openings(
             opening = next(item for item in tool_box.OPENINGS if item.name == name)
             assert rule is not None
             assert np.linalg.norm(rule - opening.centre[:2]) < min(0.0045, tolerance(measures))
+    finally:
+        view.close()
+
+
+@pytest.mark.parametrize("seed", [0, 4])
+@pytest.mark.parametrize(
+    ("widths_mm", "heights_mm", "kinds"),
+    [
+        ((28, 25, 22), (28, 40, 50), ("block", "cylinder", "cylinder")),
+        ((20, 30, 25), (20, 60, 25), ("block", "cylinder", "block")),
+    ],
+)
+def test_blocks_and_objects_of_other_heights_are_located_and_measured(
+    seed: int,
+    widths_mm: tuple[int, int, int],
+    heights_mm: tuple[int, int, int],
+    kinds: tuple[Any, Any, Any],
+    hoap3: RobotDescription,
+) -> None:
+    """Blue calibrates. A block that stands askew looks up to 1.41 times as wide."""
+    (a, b, c), (d, e, f) = ([1e-3 * size for size in sizes] for sizes in (widths_mm, heights_mm))
+    view = View(seed, hoap3, Measures(object_width=(a, b, c), object_height=(d, e, f), object_shape=kinds))
+    try:
+        assert view.calibrate(lambda: np.zeros(2)) == []
+        for name, shape in view.world.shapes.items():
+            for place in ((0.175, -0.09), (0.180, 0.06)):
+                view.park()
+                view.see(RESTS)
+                view.stand(name, place)
+                before = len(view.gestures)
+                view.see(RESTS)
+                seen = view.gestures[before:][-1]
+                assert seen.object == name
+                assert np.hypot(seen.x - place[0], seen.y - place[1]) < 0.004
+                assert abs(seen.height_m - 2 * shape.half_height) < HEIGHT_ERROR_M
+                widest = 1.45 if shape.kind == "block" else 1.1
+                assert 0.9 < seen.width_m / (2 * shape.half_width) < widest
     finally:
         view.close()

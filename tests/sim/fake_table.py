@@ -13,6 +13,7 @@ class FakeTable:
 
     def __init__(self) -> None:
         self.held_by_instructor: str | None = None
+        self.shapes = tool_box.NOMINAL.shapes(2 * tool_box.CYLINDER_RADIUS)
         self.positions = dict(zip(tool_box.COLOURS, (place.copy() for place in places.PARKED), strict=True))
         self.gripper_position = np.array((0.155, -0.03, -0.06))
         self.fingertip = np.zeros(3)

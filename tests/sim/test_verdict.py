@@ -21,6 +21,7 @@ def _layout() -> TruthLayout:
     for name, (x, y) in PLACES.items():
         layout.openings.add(name=name, x=x, y=y, radius=tool_box.OPENING_RADIUS)
     layout.rules.add(object="yellow", opening="a")
+    layout.objects.add(name="yellow", width=0.020, height=0.050)
     return layout
 
 

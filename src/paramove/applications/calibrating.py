@@ -190,7 +190,7 @@ class Calibrating(Stage):
             self._observations = []
             self._start_again(str(error))
             return None
-        homography = replace(homography, plane_frame=self.app.options.frame)
+        homography = replace(homography, plane_frame=self.app.options.frame, object_name=self._held)
         self.app.outgoing.calibrations.append(homography.to_message(round(self.app.now_s * 1e9)))
         self.app.speak("Now I know where I see what I can reach.")
         return ApplicationStage.STAGE_LEARN

@@ -59,6 +59,8 @@ class GoalClient:
         self.started_s = 0.0
         self.grasps = 0
         self.retries = 0
+        self._worked: dict[str, int] = {}
+        self._skipped = 0
 
     def start(
         self,
@@ -72,10 +74,16 @@ class GoalClient:
         plan_only: bool = False,
         size: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        """Set a goal; it is sent with the next `step`."""
+        """Set a goal; it is sent with the next `step`. Attempts at an object begin with the way that worked last."""
         self._count += 1
+        if attempt == 1:
+            self._skipped = self._worked.get(name, 0)
         goal = RelocationGoal(
-            id=f"{self._run_name}-{self._count}", kind=kind, object=name, frame=self._goals.frame, attempt=attempt
+            id=f"{self._run_name}-{self._count}",
+            kind=kind,
+            object=name,
+            frame=self._goals.frame,
+            attempt=attempt + self._skipped,
         )
         goal.plan_only, goal.object_width_m, goal.object_height_m = plan_only, *size
         if source is not None:
@@ -93,6 +101,8 @@ class GoalClient:
         """Store the status of the current goal."""
         if self._goal is not None and status.goal_id == self._goal.id:
             self._status, self._received_s = status, self._now_s
+            if self.succeeded:
+                self._worked[self._goal.object] = (self._goal.attempt - 1) % 2  # every second one is another way
 
     def step(self, now_s: float, outgoing: OutgoingMessages) -> None:
         """Send the goal, again without an acknowledgement; query it, or let it fail, without a status."""

@@ -74,10 +74,19 @@ class Path:
 
 @dataclass(frozen=True)
 class Held:
-    """An object in the gripper: the hand's pitch when it grasped it, rad, and its width, m."""
+    """An object in the gripper.
+
+    Attributes:
+        pitch: Of the hand when it grasped it, rad.
+        width: Of the object, m.
+        z: Where it was grasped, frame of the arm's base, m.
+        lowered: How far below the goal that was, m.
+    """
 
     pitch: float
     width: float
+    z: float
+    lowered: float
 
 
 @dataclass(frozen=True)

@@ -128,19 +128,21 @@ class ServoArmReaching:
         """Grasp the object at `source` and lift it. Arguments and errors as for `reach`.
 
         Where the target is known, it is grasped with a pitch that reaches that, too, so that it will stand upright.
-        Every second attempt is made with another pitch and a wider gripper; the widest objects need that, too.
+        Every second attempt is made with another pitch and a wider gripper; the widest objects need that, too. A low
+        object is grasped below its top, one of unknown height low in every second attempt.
         """
         grasp.check_height(self._clearance.cylinder.height)
-        width = self._held_width(grasp.width)
-        point = self._beside(source, width, FINGER_GAP_M)
-        pitch = self._pitch_of_both(point, None if grasp.target is None else self._beside(grasp.target, width))
+        width, lowered = self._held_width(grasp.width), self._lowered(source, grasp)
+        point = self._beside(source, width, FINGER_GAP_M) - lowered * _UP
+        target = None if grasp.target is None else self._beside(grasp.target, width) - lowered * _UP
+        pitch = self._pitch_of_both(point, target)
         opening = self.options.work_opening
         if grasp.attempt % 2 == 0:
             pitch = self._grasp_pitch(point, pitch - np.deg2rad(self.options.second_turn_deg))
         if grasp.attempt % 2 == 0 or (self._fixed_finger is None and width > self._widths[1] - 2 * FINGER_GAP_M):
             opening = self.options.second_opening
         motion = self._begun(start, standing)
-        motion.held = Held(pitch, width)
+        motion.held = Held(pitch, width, float(point[2]), lowered)
         self._over(motion, "approach", point, pitch, opening)
         self._line(motion, "lower", point, pitch)
         self._fingers(motion, "grasp", self.options.closed_opening)
@@ -151,6 +153,7 @@ class ServoArmReaching:
         """Carry the held object to `target`, release it, go back to the base pose. Errors as for `reach`."""
         held = start.held
         point = self._beside(target, self._usual_width if held is None else held.width)
+        point = point if held is None else point - held.lowered * _UP
         pitch = self._grasp_pitch(point, None if held is None else held.pitch)
         motion = self._begun(start, standing)
         self._over(motion, "carry", point, pitch, self.options.closed_opening, holding=True)
@@ -187,8 +190,10 @@ class ServoArmReaching:
         motion = self._begun(here, standing)
         hand = self.arm.position(motion.end)
         if holding:
-            below = np.array([*hand[:2], min(hand[2], self.options.table_z + self.options.grasp_height)])
-            self._put(motion, below, self._grasp_pitch(below, None if here.held is None else here.held.pitch))
+            held = here.held
+            grasped_z = self.options.table_z + self.options.low_grasp if held is None else held.z
+            below = np.array([*hand[:2], min(hand[2], grasped_z)])
+            self._put(motion, below, self._grasp_pitch(below, None if held is None else held.pitch))
         else:
             self._home(motion, "retreat", hand)
         return self._finished(motion)
@@ -401,10 +406,17 @@ class ServoArmReaching:
             return self._usual_width
         if not narrowest - WIDTH_ERROR_M <= width <= widest + WIDTH_ERROR_M:
             raise MisfitError(
-                f"the object looks {1000 * width:.0f} mm wide; this gripper holds objects of {1000 * narrowest:.0f} to "
-                f"{1000 * widest:.0f} mm"
+                f"the object looks {1000 * width:.0f} mm wide as it stands; this gripper holds objects of "
+                f"{1000 * narrowest:.0f} to {1000 * widest:.0f} mm"
             )
         return min(max(width, narrowest), widest)
+
+    def _lowered(self, source: ArrayLike, grasp: Grasp) -> float:
+        """How far below the height of the goal the object is to be grasped, m."""
+        o, height = self.options, float(np.asarray(source, dtype=np.float64)[-1]) - self.options.table_z
+        if grasp.height is not None:
+            return max(0.0, height - max(o.low_grasp, o.grasp_share * grasp.height))
+        return max(0.0, height - o.low_grasp) if grasp.attempt % 2 == 0 else 0.0
 
     def _beside(self, position: ArrayLike, width: float, gap: float = 0.0) -> Floats:
         """The end effector when an object at `position` is so far from the face of a finger that does not move."""
@@ -441,7 +453,8 @@ class ServoReachingOptions:
     speed: float = 0.06  # maximum, of straight lines
     learned_duration: float = 1.6  # minimum, of a learned movement
     longest_duration: float = 6.0  # where a learned movement takes longer, as joints turn far, a milder one is tried
-    grasp_height: float = 0.016  # above the table, at which a held object is put down where the arm was interrupted
+    grasp_share: float = 0.72  # of an object's height, at which it is grasped if that is below the goal's
+    low_grasp: float = 0.020  # above the table, of one of unknown height; also where an interrupted arm puts one down
     gripper_duration: float = 0.8
     settle_duration: float = 0.4  # time for the closed gripper to press
     work_opening: float = 0.6  # ξ

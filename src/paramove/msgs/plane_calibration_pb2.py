@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n%paramove/msgs/plane_calibration.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xd2\x01\n\x10PlaneCalibration\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x13\n\x0bimage_frame\x18\x02 \x01(\t\x12\x13\n\x0bplane_frame\x18\x03 \x01(\t\x12\x0f\n\x07plane_z\x18\x04 \x01(\x01\x12\x18\n\x10plane_from_image\x18\x05 \x03(\x01\x12;\n\x0f\x63orrespondences\x18\x06 \x03(\x0b\x32\".paramove.msgs.PlaneCorrespondence\"G\n\x13PlaneCorrespondence\x12\x0c\n\x04u_px\x18\x01 \x01(\x01\x12\x0c\n\x04v_px\x18\x02 \x01(\x01\x12\t\n\x01x\x18\x03 \x01(\x01\x12\t\n\x01y\x18\x04 \x01(\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n%paramove/msgs/plane_calibration.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xe2\x01\n\x10PlaneCalibration\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x13\n\x0bimage_frame\x18\x02 \x01(\t\x12\x13\n\x0bplane_frame\x18\x03 \x01(\t\x12\x0f\n\x07plane_z\x18\x04 \x01(\x01\x12\x18\n\x10plane_from_image\x18\x05 \x03(\x01\x12;\n\x0f\x63orrespondences\x18\x06 \x03(\x0b\x32\".paramove.msgs.PlaneCorrespondence\x12\x0e\n\x06object\x18\x07 \x01(\t\"G\n\x13PlaneCorrespondence\x12\x0c\n\x04u_px\x18\x01 \x01(\x01\x12\x0c\n\x04v_px\x18\x02 \x01(\x01\x12\t\n\x01x\x18\x03 \x01(\x01\x12\t\n\x01y\x18\x04 \x01(\x01\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -33,7 +33,7 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'paramove.msgs.plane_calibra
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_PLANECALIBRATION']._serialized_start=90
-  _globals['_PLANECALIBRATION']._serialized_end=300
-  _globals['_PLANECORRESPONDENCE']._serialized_start=302
-  _globals['_PLANECORRESPONDENCE']._serialized_end=373
+  _globals['_PLANECALIBRATION']._serialized_end=316
+  _globals['_PLANECORRESPONDENCE']._serialized_start=318
+  _globals['_PLANECORRESPONDENCE']._serialized_end=389
 # @@protoc_insertion_point(module_scope)

@@ -6,7 +6,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class TruthLayout(_message.Message):
-    __slots__ = ("seed", "openings", "rules", "world_from_shoulder", "camera_from_world", "camera_intrinsics", "surface_z", "light_levels", "pixel_noise", "world_from_table")
+    __slots__ = ("seed", "openings", "rules", "world_from_shoulder", "camera_from_world", "camera_intrinsics", "surface_z", "light_levels", "pixel_noise", "world_from_table", "objects")
     SEED_FIELD_NUMBER: _ClassVar[int]
     OPENINGS_FIELD_NUMBER: _ClassVar[int]
     RULES_FIELD_NUMBER: _ClassVar[int]
@@ -17,6 +17,7 @@ class TruthLayout(_message.Message):
     LIGHT_LEVELS_FIELD_NUMBER: _ClassVar[int]
     PIXEL_NOISE_FIELD_NUMBER: _ClassVar[int]
     WORLD_FROM_TABLE_FIELD_NUMBER: _ClassVar[int]
+    OBJECTS_FIELD_NUMBER: _ClassVar[int]
     seed: int
     openings: _containers.RepeatedCompositeFieldContainer[TruthOpening]
     rules: _containers.RepeatedCompositeFieldContainer[TruthRule]
@@ -27,7 +28,8 @@ class TruthLayout(_message.Message):
     light_levels: _containers.RepeatedScalarFieldContainer[float]
     pixel_noise: float
     world_from_table: _containers.RepeatedScalarFieldContainer[float]
-    def __init__(self, seed: _Optional[int] = ..., openings: _Optional[_Iterable[_Union[TruthOpening, _Mapping]]] = ..., rules: _Optional[_Iterable[_Union[TruthRule, _Mapping]]] = ..., world_from_shoulder: _Optional[_Iterable[float]] = ..., camera_from_world: _Optional[_Iterable[float]] = ..., camera_intrinsics: _Optional[_Iterable[float]] = ..., surface_z: _Optional[float] = ..., light_levels: _Optional[_Iterable[float]] = ..., pixel_noise: _Optional[float] = ..., world_from_table: _Optional[_Iterable[float]] = ...) -> None: ...
+    objects: _containers.RepeatedCompositeFieldContainer[TruthObject]
+    def __init__(self, seed: _Optional[int] = ..., openings: _Optional[_Iterable[_Union[TruthOpening, _Mapping]]] = ..., rules: _Optional[_Iterable[_Union[TruthRule, _Mapping]]] = ..., world_from_shoulder: _Optional[_Iterable[float]] = ..., camera_from_world: _Optional[_Iterable[float]] = ..., camera_intrinsics: _Optional[_Iterable[float]] = ..., surface_z: _Optional[float] = ..., light_levels: _Optional[_Iterable[float]] = ..., pixel_noise: _Optional[float] = ..., world_from_table: _Optional[_Iterable[float]] = ..., objects: _Optional[_Iterable[_Union[TruthObject, _Mapping]]] = ...) -> None: ...
 
 class TruthOpening(_message.Message):
     __slots__ = ("name", "x", "y", "radius")
@@ -40,6 +42,16 @@ class TruthOpening(_message.Message):
     y: float
     radius: float
     def __init__(self, name: _Optional[str] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., radius: _Optional[float] = ...) -> None: ...
+
+class TruthObject(_message.Message):
+    __slots__ = ("name", "width", "height")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    WIDTH_FIELD_NUMBER: _ClassVar[int]
+    HEIGHT_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    width: float
+    height: float
+    def __init__(self, name: _Optional[str] = ..., width: _Optional[float] = ..., height: _Optional[float] = ...) -> None: ...
 
 class TruthRule(_message.Message):
     __slots__ = ("object", "opening")

@@ -31,6 +31,7 @@ class PlaneHomography:
         plane_z: height of the plane in `plane_frame`, m.
         plane_frame, image_frame: names of the frames.
         correspondences: [M, 4] rows (u_px, v_px, x, y) that it was fitted to.
+        object_name: Of the object whose middle was seen there; empty if that is not known.
     """
 
     plane_from_image_matrix: Floats
@@ -38,6 +39,7 @@ class PlaneHomography:
     plane_frame: str = "right_shoulder"
     image_frame: str = "camera_optical"
     correspondences: Floats | None = None
+    object_name: str = ""
 
     @classmethod
     def fit(cls, image_points: ArrayLike, plane_points: ArrayLike, plane_z: float = 0.0) -> PlaneHomography:
@@ -74,7 +76,7 @@ class PlaneHomography:
             raise HomographyError(f"plane_from_image is singular: {matrix.tolist()}")
         rows = [(c.u_px, c.v_px, c.x, c.y) for c in message.correspondences]
         known = np.array(rows, dtype=np.float64) if rows else None
-        return cls(matrix, message.plane_z, message.plane_frame, message.image_frame, known)
+        return cls(matrix, message.plane_z, message.plane_frame, message.image_frame, known, message.object)
 
     def to_message(self, captured_ns: int = 0) -> PlaneCalibration:
         """The calibration as the message that `from_message` reads."""
@@ -83,6 +85,7 @@ class PlaneHomography:
             plane_frame=self.plane_frame,
             plane_z=self.plane_z,
             plane_from_image=self.plane_from_image_matrix.ravel().tolist(),
+            object=self.object_name,
         )
         message.captured.FromNanoseconds(captured_ns)
         for u, v, x, y in [] if self.correspondences is None else self.correspondences:
@@ -92,6 +95,19 @@ class PlaneHomography:
     def plane_from_image(self, u_px: float, v_px: float) -> tuple[float, float]:
         """(x, y), m. Raises ValueError for a point on the plane's horizon."""
         return _apply(self.plane_from_image_matrix, u_px, v_px)
+
+    def below_plane(self, u_px: float, v_px: float, depth: float) -> tuple[float, float]:
+        """(x, y), m, of what is seen there and lies `depth`, m, below the plane: farther from the camera.
+
+        By a parallel projection near (u, v), of a camera that is not upside down.
+        """
+        x, y = self.plane_from_image(u_px, v_px)
+        along_axes = self._along_axes(u_px, v_px)
+        away = np.linalg.svd(along_axes)[2][1]  # the direction that is foreshortened most
+        away *= -np.sign((along_axes @ away)[1])  # up in the image
+        sine = self.sine_of_elevation(u_px, v_px)
+        farther = depth * np.sqrt(1.0 - sine**2) / sine
+        return float(x + farther * away[0]), float(y + farther * away[1])
 
     def image_from_plane(self, x: float, y: float) -> tuple[float, float]:
         """(u, v), px. Raises ValueError for a point without a finite image."""

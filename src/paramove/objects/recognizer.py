@@ -22,6 +22,8 @@ BLIND_S = 0.35
 LONGEST_STEP_S = 0.2
 """Maximum observation time that one image counts for."""
 MAX_PX = 1e6
+HEIGHTS_DIFFER = 0.007
+"""m; less can be the error of two heights that are measured in an image."""
 MAX_SINE = 0.98
 """Of the camera's elevation: one that is higher up does not see how high an object is."""
 CLOCK_BACK_S = 5.0
@@ -51,6 +53,7 @@ class Recognizer:
         self._pointing = Pointing(self._options.pointing)
         self._hand = _HandPresence()
         self._calibrated: tuple[PlaneCalibration, PlaneHomography] | None = None
+        self._plane_height = 0.0
         self._latest_s: float | None = None
         self._watched_s = 0.0
 
@@ -130,7 +133,12 @@ class Recognizer:
         if calibration is None:
             return None
         if self._calibrated is None or self._calibrated[0] != calibration:
-            self._calibrated = (calibration, PlaneHomography.from_message(calibration))
+            homography = PlaneHomography.from_message(calibration)
+            self._calibrated, self._plane_height = (calibration, homography), 0.0
+            last = self._last_detected.get(homography.object_name)
+            if last is not None:
+                full = self._full_size.expected(homography.object_name, last.u_px, last.v_px)
+                self._plane_height = _size(full, last.u_px, last.v_px, homography)[1]
         return self._calibrated[1]
 
     def _gesture(
@@ -148,32 +156,16 @@ class Recognizer:
             if transition.in_motion:
                 self._put_over_opening(gesture, homography)
             gesture.located, gesture.frame = True, homography.plane_frame
-            gesture.x, gesture.y = homography.plane_from_image(gesture.u_px, gesture.v_px)
-            gesture.width_m, gesture.height_m = self._size(gesture, homography)
+            motion, full = self._objects[name], self._full_size.expected(name, gesture.u_px, gesture.v_px)
+            height = _size(full, gesture.u_px, gesture.v_px, homography)[1]
+            depth = (self._plane_height - height) / 2 if height and self._plane_height else 0.0
+            depth = depth if abs(depth) > HEIGHTS_DIFFER / 2 else 0.0
+            gesture.x, gesture.y = homography.below_plane(gesture.u_px, gesture.v_px, depth)
+            if motion.state is State.RESTING and motion.position is not None:
+                full = motion.position.size  # it may have been exchanged
+            gesture.width_m, gesture.height_m = _size(full, gesture.u_px, gesture.v_px, homography)
         gesture.twin = any(one.twin for one in tracked.objects if one.name == name)
         return gesture
-
-    def _size(self, gesture: Gesture, homography: PlaneHomography) -> tuple[float, float]:
-        """Width and height, m, of an upright object as it looks where it is; 0 if that is not known.
-
-        Its region is as high as its axis, foreshortened, and the circles at its ends, to where they are half as wide.
-        A lean changes neither its area nor its height.
-        """
-        motion = self._objects[gesture.object]
-        if motion.state is State.RESTING and motion.position is not None:
-            seen: Size | None = motion.position.size  # it may have been exchanged
-        else:
-            seen = self._full_size.expected(gesture.object, gesture.u_px, gesture.v_px)
-        if seen is None:
-            return 0.0, 0.0
-        slant = math.hypot(1.0, seen.lean)
-        across_px = seen.area_px / seen.height_px
-        sides = (gesture.u_px - across_px / slant / 2, gesture.u_px + across_px / slant / 2)
-        width = math.dist(*(homography.plane_from_image(side, gesture.v_px) for side in sides))
-        ends_px = math.sqrt(3) / 2 * homography.foreshortening(gesture.u_px, gesture.v_px) * across_px
-        sine = min(homography.sine_of_elevation(gesture.u_px, gesture.v_px), MAX_SINE)
-        axis_px = slant * max(0.0, seen.height_px - ends_px)
-        return width, axis_px * width / (across_px / slant * math.sqrt(1.0 - sine**2))
 
     def _put_over_opening(self, gesture: Gesture, homography: PlaneHomography) -> None:
         """Moves a gesture over an opening to where an object with its foot in the opening's middle would be detected.
@@ -188,6 +180,24 @@ class Recognizer:
         opening = self._openings.at(gesture.u_px + du, gesture.v_px + dv)
         if opening is not None:
             gesture.u_px, gesture.v_px, gesture.confidence = opening[0] - du, opening[1] - dv, 1.0
+
+
+def _size(seen: Size | None, u_px: float, v_px: float, homography: PlaneHomography) -> tuple[float, float]:
+    """Width and height, m, of an upright object as it looks at (u, v); 0 if that is not known.
+
+    Its region is as high as its axis, foreshortened, and the circles at its ends, to where they are half as wide.
+    A lean changes neither its area nor its height.
+    """
+    if seen is None:
+        return 0.0, 0.0
+    slant = math.hypot(1.0, seen.lean)
+    across_px = seen.area_px / seen.height_px
+    sides = (u_px - across_px / slant / 2, u_px + across_px / slant / 2)
+    width = math.dist(*(homography.plane_from_image(side, v_px) for side in sides))
+    ends_px = math.sqrt(3) / 2 * homography.foreshortening(u_px, v_px) * across_px
+    sine = min(homography.sine_of_elevation(u_px, v_px), MAX_SINE)
+    axis_px = slant * max(0.0, seen.height_px - ends_px)
+    return width, axis_px * width / (across_px / slant * math.sqrt(1.0 - sine**2))
 
 
 class _HandPresence:

@@ -85,6 +85,10 @@ class Truth:
         """Object -> name of the opening that it belongs to."""
         return {rule.object: rule.opening for rule in self.layout.rules}
 
+    def half_height_of(self, name: str) -> float:
+        """Of an object, m; recordings that lack it are of cylinders of 50 mm."""
+        return next((item.height / 2 for item in self.layout.objects if item.name == name), 0.025)
+
     def at(self, time_s: float) -> int:
         """Index of the state nearest to a time."""
         return int(np.abs(self.time_s - time_s).argmin())

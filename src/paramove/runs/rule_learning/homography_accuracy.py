@@ -18,7 +18,6 @@ from paramove.runs.summary_statistics import summary_statistics
 GRID_X = (0.135, 0.190)
 GRID_Y = (-0.100, 0.076)
 GRID_STEPS = (12, 23)
-HALF_HEIGHT = 0.025  # of the cylinders: their visible centre is at this height above the surface, m
 STANDING = 0.003  # m; an object this near to its standing height rests on the surface
 UPRIGHT = 0.99
 GOAL_MM = 3.0
@@ -75,7 +74,8 @@ def grid_error(run: RecordedRun) -> MappedPoints | None:
         return None
     x, y = np.meshgrid(np.linspace(*GRID_X, GRID_STEPS[0]), np.linspace(*GRID_Y, GRID_STEPS[1]), indexing="ij")
     true = np.stack([x.ravel(), y.ravel()], axis=1)
-    height = np.full((len(true), 1), run.truth.surface_z + HALF_HEIGHT)
+    half_height = run.truth.half_height_of(homography.object_name)
+    height = np.full((len(true), 1), run.truth.surface_z + half_height)
     image = project(run.truth.layout, np.hstack([true, height]) + run.truth.shoulder)
     return MappedPoints(true, np.array([homography.plane_from_image(u, v) for u, v in image]))
 
@@ -97,7 +97,10 @@ def detected_at_rest(run: RecordedRun) -> list[DetectedAtRest]:
         time_s = run.captured_s(gesture)
         state = truth.at(time_s)
         x, y, z = truth.objects[gesture.object][state]
-        stands = abs(z - truth.surface_z - HALF_HEIGHT) < STANDING and truth.upright[gesture.object][state] > UPRIGHT
+        stands = (
+            abs(z - truth.surface_z - truth.half_height_of(gesture.object)) < STANDING
+            and truth.upright[gesture.object][state] > UPRIGHT
+        )
         if stands:
             detections.append(DetectedAtRest(time_s, gesture.object, (float(x), float(y)), (gesture.x, gesture.y)))
     return detections
