@@ -195,6 +195,32 @@ def test_a_low_object_is_grasped_low_and_put_down_as_low(
         np.testing.assert_allclose(at[2], expected, rtol=0, atol=1e-4)
 
 
+@pytest.mark.parametrize("turn_deg", [-40.0, 10.0, 35.0, 130.0])
+@pytest.mark.parametrize("place", [(0.15, 0.0), (0.16, 0.06), (0.14, -0.08)])
+def test_a_hand_with_roll_is_turned_along_the_sides_of_a_block(turn_deg: float, place: tuple[float, float]) -> None:
+    plan, oracle, source = reaching("koch_v1_1"), Oracle("koch_v1_1"), np.array((*place, 0.036))
+    far = np.array((0.15, -0.03, 0.036))
+    fetch = plan.fetch(source, grasp=Grasp(far, width=0.020, turn=np.deg2rad(turn_deg)))
+    row = fetch.angles[round(dict(fetch.phases)["grasp"] / 0.01)]
+    np.testing.assert_allclose(oracle.object_in(row, FINGER_GAP_M), source, rtol=0, atol=2e-4)
+    side = oracle.scene.data.site(oracle.chain.sites.end_effector).xmat.reshape(3, 3)[:, 1]
+    off_deg = np.rad2deg(np.arctan2(side[1], side[0])) - turn_deg
+    assert abs(np.remainder(off_deg + 45, 90) - 45) < 3.0, "the hand does not point straight down"
+    assert_playable("koch_v1_1", fetch)
+    deliver = plan.deliver(fetch.end, far)
+    assert_playable("koch_v1_1", deliver, fetch.angles[-1])
+    row = deliver.angles[round(dict(deliver.phases)["release"] / 0.01)]
+    np.testing.assert_allclose(oracle.object_in(row, 0.0), far, rtol=0, atol=2e-4)
+
+
+def test_an_arm_without_roll_takes_a_block_that_fits_between_its_fingers_as_it_stands() -> None:
+    plan, source = reaching("open_manipulator_x"), np.array((0.15, 0.0, 0.036))
+    for width, turn_deg in ((0.030, 45.0), (0.045, 0.0)):
+        plan.fetch(source, grasp=Grasp(width=width, turn=np.deg2rad(turn_deg)))
+    with pytest.raises(NoPlanError, match="64 mm wide"):
+        plan.fetch(source, grasp=Grasp(width=0.045, turn=np.deg2rad(45.0)))
+
+
 @each_arm
 def test_begins_wherever_the_arm_is(name: str) -> None:
     plan, oracle = reaching(name), Oracle(name)

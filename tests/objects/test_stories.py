@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks.many_worlds import RESTS, View, tolerance
-from paramove.motion.plans import HEIGHT_ERROR_M
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.robots.description import RobotDescription
 from sim import tool_box
@@ -109,7 +108,7 @@ def test_blocks_and_objects_of_other_heights_are_located_and_measured(
     kinds: tuple[Any, Any, Any],
     hoap3: RobotDescription,
 ) -> None:
-    """Blue calibrates. A block that stands askew looks up to 1.41 times as wide."""
+    """Blue calibrates."""
     (a, b, c), (d, e, f) = ([1e-3 * size for size in sizes] for sizes in (widths_mm, heights_mm))
     view = View(seed, hoap3, Measures(object_width=(a, b, c), object_height=(d, e, f), object_shape=kinds))
     try:
@@ -124,8 +123,11 @@ def test_blocks_and_objects_of_other_heights_are_located_and_measured(
                 seen = view.gestures[before:][-1]
                 assert seen.object == name
                 assert np.hypot(seen.x - place[0], seen.y - place[1]) < 0.004
-                assert abs(seen.height_m - 2 * shape.half_height) < HEIGHT_ERROR_M
-                widest = 1.45 if shape.kind == "block" else 1.1
-                assert 0.9 < seen.width_m / (2 * shape.half_width) < widest
+                assert abs(seen.height_m - 2 * shape.half_height) < 0.007
+                assert abs(seen.width_m - 2 * shape.half_width) < 0.0025
+                assert seen.HasField("turn_rad") == (shape.kind == "block")
+                if shape.kind == "block":
+                    off = np.remainder(seen.turn_rad - view.looks.turns[name] + np.pi / 4, np.pi / 2) - np.pi / 4
+                    assert abs(np.rad2deg(off)) < 8.0
     finally:
         view.close()

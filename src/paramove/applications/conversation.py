@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from paramove.applications.table import UNKNOWN, Size
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
@@ -72,12 +73,15 @@ class GoalClient:
         avoid: Iterable[tuple[float, float]] = (),
         attempt: int = 1,
         plan_only: bool = False,
-        size: tuple[float, float] = (0.0, 0.0),
+        size: Size = UNKNOWN,
     ) -> None:
-        """Set a goal; it is sent with the next `step`. Attempts at an object begin with the way that worked last."""
+        """Set a goal; it is sent with the next `step`.
+
+        Attempts at an object of unknown height begin in the way that worked last.
+        """
         self._count += 1
         if attempt == 1:
-            self._skipped = self._worked.get(name, 0)
+            self._skipped = 0 if size.height else self._worked.get(name, 0)
         goal = RelocationGoal(
             id=f"{self._run_name}-{self._count}",
             kind=kind,
@@ -85,7 +89,9 @@ class GoalClient:
             frame=self._goals.frame,
             attempt=attempt + self._skipped,
         )
-        goal.plan_only, goal.object_width_m, goal.object_height_m = plan_only, *size
+        goal.plan_only, goal.object_width_m, goal.object_height_m = plan_only, size.width, size.height
+        if size.turn is not None:
+            goal.object_turn_rad = size.turn
         if source is not None:
             getattr(goal, "from").CopyFrom(source)
         if target is not None:

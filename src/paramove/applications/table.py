@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from paramove.msgs.gesture_pb2 import Gesture
 
 AT_REST = frozenset({Gesture.KIND_APPEARED, Gesture.KIND_RESTED})
+
+
+class Size(NamedTuple):
+    """Width and height of an upright object, m, 0: not known; angle from x to a side of a square foot, rad."""
+
+    width: float = 0.0
+    height: float = 0.0
+    turn: float | None = None
+
+
+UNKNOWN = Size()
 
 
 @dataclass(frozen=True)
@@ -18,7 +30,7 @@ class Sighting:
         time_s: Capture time.
         u_px, v_px: Image point.
         position: x, y in the plane's frame, m; None while there is no calibration.
-        size: Width and height of the object, m; 0: not known.
+        size: Of the object.
     """
 
     kind: int
@@ -26,7 +38,7 @@ class Sighting:
     u_px: float
     v_px: float
     position: tuple[float, float] | None
-    size: tuple[float, float] = (0.0, 0.0)
+    size: Size = UNKNOWN
 
     @property
     def at_rest(self) -> bool:
@@ -66,7 +78,8 @@ class Table:
             self.hand_in_view = gesture.kind == Gesture.KIND_HAND_APPEARED
             self.hand_changed_s = time_s
             return
-        size = (gesture.width_m, gesture.height_m)
+        turn = gesture.turn_rad if gesture.HasField("turn_rad") else None
+        size = Size(gesture.width_m, gesture.height_m, turn)
         if gesture.kind == Gesture.KIND_POINTED_AT and gesture.object in self.objects:
             self.objects[gesture.object] = replace(self.objects[gesture.object], size=size)
         elif gesture.object and gesture.kind != Gesture.KIND_POINTED_AT:

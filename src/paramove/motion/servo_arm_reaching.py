@@ -129,11 +129,14 @@ class ServoArmReaching:
 
         Where the target is known, it is grasped with a pitch that reaches that, too, so that it will stand upright.
         Every second attempt is made with another pitch and a wider gripper; the widest objects need that, too. A low
-        object is grasped below its top, one of unknown height low in every second attempt.
+        object is grasped below its top, one of unknown height low in every second attempt. An arm with a roll turns its
+        fingers along the sides of a square foot.
         """
         grasp.check_height(self._clearance.cylinder.height)
-        width, lowered = self._held_width(grasp.width), self._lowered(source, grasp)
-        point = self._beside(source, width, FINGER_GAP_M) - lowered * _UP
+        askew, lowered = self._askew(source, grasp.turn), self._lowered(source, grasp)
+        turned = askew if self._arm.n_joints == 5 else 0.0
+        width = self._held_width(grasp.width, askew - turned)
+        point = self._beside(source, width, FINGER_GAP_M, turned) - lowered * _UP
         target = None if grasp.target is None else self._beside(grasp.target, width) - lowered * _UP
         pitch = self._pitch_of_both(point, target)
         opening = self.options.work_opening
@@ -142,7 +145,7 @@ class ServoArmReaching:
         if grasp.attempt % 2 == 0 or (self._fixed_finger is None and width > self._widths[1] - 2 * FINGER_GAP_M):
             opening = self.options.second_opening
         motion = self._begun(start, standing)
-        motion.held = Held(pitch, width, float(point[2]), lowered)
+        motion.held, motion.roll = Held(pitch, width, float(point[2]), lowered), -turned  # the hand points down
         self._over(motion, "approach", point, pitch, opening)
         self._line(motion, "lower", point, pitch)
         self._fingers(motion, "grasp", self.options.closed_opening)
@@ -180,7 +183,7 @@ class ServoArmReaching:
         """Open the gripper where it is, draw it up, go back to the base pose. Errors as for `reach`."""
         motion = self._begun(here, standing)
         self._fingers(motion, "release", self.options.work_opening)
-        self._home(motion, "retreat", self.arm.position(motion.end))
+        self._home(motion, "retreat", self._before_roll(motion.end)[1])
         return self._finished(motion)
 
     def home(
@@ -188,7 +191,7 @@ class ServoArmReaching:
     ) -> PlannedMotion:
         """Back to the base pose, by the learned retreat; a held object is put down first. Errors as for `reach`."""
         motion = self._begun(here, standing)
-        hand = self.arm.position(motion.end)
+        hand = self._before_roll(motion.end)[1]
         if holding:
             held = here.held
             grasped_z = self.options.table_z + self.options.low_grasp if held is None else held.z
@@ -268,7 +271,7 @@ class ServoArmReaching:
         reason = ""
         for arch in _ARCHES_M:
             try:
-                rows = self._along(motion.end, path.raised(arch), point, pitch, gripper)
+                rows = self._along(motion, path.raised(arch), point, pitch, gripper)
             except NoJointPathError as error:
                 reason = reason or str(error)
                 continue
@@ -280,14 +283,15 @@ class ServoArmReaching:
 
     def _line(self, motion: MotionRows, name: str, point: Floats, pitch: float, holding: bool = False) -> None:
         """Straight, with the gripper as it is."""
-        here = self.arm.position(motion.end)
+        start, here = self._before_roll(motion.end)
         distance = float(np.linalg.norm(point - here))
         n = max(6, int(np.ceil(distance / 0.004)))
         positions = here + np.linspace(0.0, 1.0, n)[:, None] * (point - here)
         try:
-            arm = planar_path(self._arm, positions, np.full(n, pitch), motion.end[:-1])
+            arm = planar_path(self._arm, positions, np.full(n, pitch), start)
         except NoJointPathError as error:
             raise motion.no_plan(f"no straight line leads to {metres(point)}: {error}") from error
+        arm[:, 4:] = motion.end[4:-1]
         knots = np.concatenate([arm, np.full((n, 1), motion.end[-1])], axis=1)
         duration = 1.875 * distance / self.options.speed  # the peak of the minimum-jerk profile
         rows = self._inside(rest_to_rest(knots, duration, self._period, self._limits))
@@ -309,14 +313,14 @@ class ServoArmReaching:
         if np.abs(motion.end - end).max() > 1e-9:
             motion.add(name, rest_to_rest(np.linspace(motion.end, end, 6), 0.2, self._period, self._limits), False)
 
-    def _along(self, start: Floats, path: LearnedPath, point: Floats, pitch: float, gripper: Floats) -> Floats:
-        here = self._arm.forward(start[:-1])
-        positions = path.between(here.position, point, self._arm.yaw_axis)
+    def _along(self, motion: MotionRows, path: LearnedPath, point: Floats, pitch: float, gripper: Floats) -> Floats:
+        start, here = self._before_roll(motion.end)
+        positions = path.between(here, point, self._arm.yaw_axis)
         fraction = minimum_jerk(np.linspace(0.0, 1.0, POINTS))
-        pitches = float(here.pitch) + fraction * (pitch - float(here.pitch))
-        arm = planar_path(self._arm, positions, pitches, start[:-1])
-        if self._arm.n_joints == 5:  # the search has no roll: it is turned back along the path
-            arm[:, 4] = (1.0 - fraction) * start[4]
+        before = float(self._arm.forward(start).pitch)
+        arm = planar_path(self._arm, positions, before + fraction * (pitch - before), start)
+        # the search has no roll: it changes evenly along the path
+        arm[:, 4:] = (1.0 - fraction[:, None]) * motion.end[4:-1] + fraction[:, None] * motion.roll
         knots = np.concatenate([arm, gripper[:, None]], axis=1)
         return self._inside(rest_to_rest(knots, self.options.learned_duration, self._period, self._limits, ramped))
 
@@ -399,14 +403,19 @@ class ServoArmReaching:
             preferred = self._grasp_pitch(axis + self._usual_reach * ahead, preferred)
         return self._grasp_pitch(source, preferred)
 
-    def _held_width(self, width: float | None) -> float:
-        """A width that the gripper holds, m, as measured ones are not exact; raises MisfitError."""
+    def _held_width(self, width: float | None, askew: float) -> float:
+        """A width that the gripper holds, m, as measured ones are not exact; raises MisfitError.
+
+        Args:
+            askew: Angle between fingers and sides of a square foot, rad: it must fit between them before it turns.
+        """
         narrowest, widest = self._widths
         if width is None:
             return self._usual_width
-        if not narrowest - WIDTH_ERROR_M <= width <= widest + WIDTH_ERROR_M:
+        across = width * (np.cos(askew) + abs(np.sin(askew)))
+        if not narrowest - WIDTH_ERROR_M <= width <= across <= widest + WIDTH_ERROR_M:
             raise MisfitError(
-                f"the object looks {1000 * width:.0f} mm wide as it stands; this gripper holds objects of "
+                f"the object looks {1000 * across:.0f} mm wide as it stands; this gripper holds objects of "
                 f"{1000 * narrowest:.0f} to {1000 * widest:.0f} mm"
             )
         return min(max(width, narrowest), widest)
@@ -418,15 +427,35 @@ class ServoArmReaching:
             return max(0.0, height - max(o.low_grasp, o.grasp_share * grasp.height))
         return max(0.0, height - o.low_grasp) if grasp.attempt % 2 == 0 else 0.0
 
-    def _beside(self, position: ArrayLike, width: float, gap: float = 0.0) -> Floats:
-        """The end effector when an object at `position` is so far from the face of a finger that does not move."""
-        point = np.asarray(position, dtype=np.float64)
-        if self._fixed_finger is None or point.shape != (3,):
+    def _askew(self, source: ArrayLike, turn: float | None) -> float:
+        """Angle, rad, up to π/4, from the fingers of the hand without roll to the sides of a square foot."""
+        if turn is None:
+            return 0.0
+        x, y = np.asarray(source, dtype=np.float64)[:2] - self._arm.yaw_axis
+        return float(np.remainder(turn - np.arctan2(y, x) + np.pi / 4, np.pi / 2) - np.pi / 4)
+
+    def _beside(self, position: ArrayLike, width: float, gap: float = 0.0, turned: float = 0.0) -> Floats:
+        """The end effector when an object at `position` is so far from the face of a finger that does not move.
+
+        Args:
+            turned: Of the hand, about the vertical, after it has come there without roll, rad.
+        """
+        point, face = np.asarray(position, dtype=np.float64), self._fixed_finger
+        if point.shape != (3,) or (face is None and turned == 0.0):
             return point
-        aside = self._fixed_finger - np.copysign(width / 2 + gap, self._fixed_finger)
-        ahead = point[:2] - self._arm.yaw_axis
-        left = np.array([-ahead[1], ahead[0], 0.0]) / max(float(np.linalg.norm(ahead)), 1e-9)
-        return np.asarray(point - aside * left)
+        aside = 0.0 if face is None else face - np.copysign(width / 2 + gap, face)
+        ahead = (point[:2] - self._arm.yaw_axis) / max(float(np.linalg.norm(point[:2] - self._arm.yaw_axis)), 1e-9)
+        left = np.array([-ahead[1], ahead[0]])
+        from_roll_axis = self._arm.hand[1] * left + self._arm.hand[2] * ahead  # of a hand that points down
+        rotation = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
+        moved = from_roll_axis - rotation @ (aside * left + from_roll_axis)
+        return np.asarray(point + np.append(moved, 0.0))
+
+    def _before_roll(self, row: Floats) -> tuple[Floats, Floats]:
+        """The arm's angles [J] of a row with roll 0, and where the end effector then is, [3]."""
+        arm = row[:-1].copy()
+        arm[4:] = 0.0
+        return arm, self._arm.forward(arm).position
 
     def _above(self, point: Floats, pitch: float) -> tuple[Floats, float]:
         above = point + self.options.lift * _UP
@@ -477,6 +506,7 @@ class MotionRows:
     standing: Floats = field(default_factory=lambda: NOTHING)
     in_the_way: set[int] = field(default_factory=set)
     held: Held | None = None
+    roll: float = 0.0  # with which its learned movements end, rad
 
     @property
     def end(self) -> Floats:

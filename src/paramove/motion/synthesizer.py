@@ -207,7 +207,7 @@ class Synthesizer:
     def _fetch(self, goal: RelocationGoal, then: Callable[[RestPose, Floats, Floats], PlannedMotion]) -> _Course:
         source, target, standing = point_of(goal, "from"), point_of(goal, "to"), standing_of(goal)
         known = target if goal.kind == RelocationGoal.KIND_RELOCATE else None
-        grasp = Grasp(known, goal.attempt, size_of(goal, "width"), size_of(goal, "height"))
+        grasp = Grasp(known, goal.attempt, size_of(goal, "width"), size_of(goal, "height"), turn_of(goal))
         fetch = self._plans.fetch(source, standing, self._start_of(goal), grasp)
         onwards = then(fetch.end, target, standing)  # known to be possible before the arm moves
         yield fetch
@@ -406,6 +406,15 @@ def size_of(goal: RelocationGoal, name: str) -> float | None:
     if not 0.0 <= size <= FARTHEST:  # NaN is not either
         raise GoalRejectedError(f"object_{name}_m is {size}; 0 (not known) to {FARTHEST:g} m expected")
     return size or None
+
+
+def turn_of(goal: RelocationGoal) -> float | None:
+    """How a square foot is turned, rad; None for a round one; raises GoalRejectedError if it is no angle."""
+    if not goal.HasField("object_turn_rad"):
+        return None
+    if not abs(goal.object_turn_rad) <= 2 * math.pi:  # NaN is not either
+        raise GoalRejectedError(f"object_turn_rad is {goal.object_turn_rad}; an angle in rad expected")
+    return goal.object_turn_rad
 
 
 def standing_of(goal: RelocationGoal) -> Floats:

@@ -167,9 +167,9 @@ class ColourTracker:
             lean=region.lean,
             confidence=1.0,
         )
+        for u, v in region.outline:
+            message.outline.add(u_px=float(u), v_px=float(v))
         if colour.hand:
-            for u, v in region.outline:
-                message.outline.add(u_px=float(u), v_px=float(v))
             return message
         recent = self._recent[colour.name]
         recent.append(region)
@@ -241,10 +241,10 @@ def _measure(image: Image, box: tuple[int, int, int, int], colour: Colour) -> Re
     # The 30th percentile is the region's shaded side; half of it is the border between region and grey background.
     side = float(of_hue_chroma[int(0.3 * of_hue_chroma.size)])
     weight = np.clip((chroma - 0.25 * side) * (2.0 / side), 0.0, 1.0) * (of_hue > 0)
-    return _region(weight, left, top, outlined=colour.hand)
+    return _region(weight, left, top, colour.hand)
 
 
-def _region(weight: Floats, left: int, top: int, outlined: bool) -> Region | None:
+def _region(weight: Floats, left: int, top: int, hand: bool) -> Region | None:
     area = float(weight.sum())
     if area <= 0:
         return None
@@ -252,9 +252,8 @@ def _region(weight: Floats, left: int, top: int, outlined: bool) -> Region | Non
     left_edge, right_edge = _extent(columns)
     top_edge, bottom_edge = _extent(rows)
     u, v = float(columns @ np.arange(columns.size)) / area, float(rows @ np.arange(rows.size)) / area
-    lean, outline = _lean(weight, u, v), np.zeros((0, 2))
-    if outlined:
-        outline = _outline(weight, left, top)
+    lean = _lean(weight, u, v)
+    if hand:
         u, v = _palm(weight)
     return Region(
         u_px=left + u,
@@ -265,7 +264,7 @@ def _region(weight: Floats, left: int, top: int, outlined: bool) -> Region | Non
         width_px=right_edge - left_edge,
         height_px=bottom_edge - top_edge,
         lean=lean,
-        outline=outline,
+        outline=_outline(weight, left, top),
     )
 
 

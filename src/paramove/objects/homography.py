@@ -102,10 +102,10 @@ class PlaneHomography:
         By a parallel projection near (u, v), of a camera that is not upside down.
         """
         x, y = self.plane_from_image(u_px, v_px)
-        along_axes = self._along_axes(u_px, v_px)
-        away = np.linalg.svd(along_axes)[2][1]  # the direction that is foreshortened most
-        away *= -np.sign((along_axes @ away)[1])  # up in the image
-        sine = self.sine_of_elevation(u_px, v_px)
+        directions = self.image_directions(u_px, v_px)
+        _, (largest, smallest), axes = np.linalg.svd(directions)
+        away = -np.sign((directions @ axes[1])[1]) * axes[1]  # foreshortened most; up in the image
+        sine = smallest / largest  # of the camera's elevation, as a small circle is seen as an ellipse
         farther = depth * np.sqrt(1.0 - sine**2) / sine
         return float(x + farther * away[0]), float(y + farther * away[1])
 
@@ -125,19 +125,14 @@ class PlaneHomography:
 
         Straight from above it is 1; of a camera that is not rolled, it is the sine of its elevation.
         """
-        across, down = self._along_axes(u_px, v_px)
+        across, down = self.image_directions(u_px, v_px)
         return float(np.linalg.norm(down) / np.linalg.norm(across))
 
-    def sine_of_elevation(self, u_px: float, v_px: float) -> float:
-        """Of the camera above the plane as seen from (u, v): a small circle's minor axis over its major axis there."""
-        major, minor = np.linalg.svd(self._along_axes(u_px, v_px), compute_uv=False)
-        return float(minor / major)
-
-    def _along_axes(self, u_px: float, v_px: float) -> Floats:
-        """How u and v (rows) change along 1 mm of x and y (columns) near (u, v), px."""
+    def image_directions(self, u_px: float, v_px: float) -> Floats:
+        """How u and v (rows) change along x and y (columns) near (u, v), px/m, [2, 2]."""
         x, y = self.plane_from_image(u_px, v_px)
         along_x, along_y = (np.array(self.image_from_plane(x + dx, y + dy)) for dx, dy in ((1e-3, 0.0), (0.0, 1e-3)))
-        return np.asarray(np.column_stack([along_x, along_y]) - np.array([[u_px], [v_px]]), dtype=np.float64)
+        return np.asarray(np.column_stack([along_x, along_y]) - np.array([[u_px], [v_px]]), dtype=np.float64) / 1e-3
 
     def _check_not_mirrored(self, image: Floats) -> None:
         depths = image @ self.plane_from_image_matrix[2, :2] + self.plane_from_image_matrix[2, 2]

@@ -111,6 +111,10 @@ class ObjectMotion:
         """Visible fraction of the object's full area, 0 to 1."""
         return self._full_size.visible_fraction(self.name, sample.u_px, sample.v_px, sample.area_px)
 
+    def rests_in_clear_view(self, sample: Sample) -> bool:
+        """Whether it is at rest and nothing hides it in this sample."""
+        return self.state is State.RESTING and self.visible_fraction(sample) >= self._limits.clear_share
+
     def _unseen(self, now_s: float, hand_near: bool) -> list[Transition]:
         self._displaced_since = self._still_since = None
         if self.state is State.UNSEEN or not self._history:

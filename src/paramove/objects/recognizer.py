@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
-from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
-from paramove.objects.full_size import FullSize, Size
+from paramove.msgs.tracked_objects_pb2 import OutlinePoint, TrackedObject, TrackedObjects
+from paramove.objects.full_size import FullSize
 from paramove.objects.homography import PlaneHomography
 from paramove.objects.object_motion import MotionThresholds, ObjectMotion, State, Transition
 from paramove.objects.openings import OpeningTracker
 from paramove.objects.pointing import Pointing, PointingThresholds
 from paramove.objects.sinking import Sample
+from paramove.objects.upright_shape import UprightShape, upright_shape
 
 HAND_SEEN_S = 0.18
 HAND_GONE_S = 0.5
@@ -24,8 +27,6 @@ LONGEST_STEP_S = 0.2
 MAX_PX = 1e6
 HEIGHTS_DIFFER = 0.007
 """m; less can be the error of two heights that are measured in an image."""
-MAX_SINE = 0.98
-"""Of the camera's elevation: one that is higher up does not see how high an object is."""
 CLOCK_BACK_S = 5.0
 """An image older than this is not delayed: the clock, or an image's time, was wrong."""
 
@@ -54,6 +55,7 @@ class Recognizer:
         self._hand = _HandPresence()
         self._calibrated: tuple[PlaneCalibration, PlaneHomography] | None = None
         self._plane_height = 0.0
+        self._outlines: dict[str, Sequence[OutlinePoint]] = {}
         self._latest_s: float | None = None
         self._watched_s = 0.0
 
@@ -70,10 +72,10 @@ class Recognizer:
                 motion.blind = True
         self._watched_s += min(step_s, LONGEST_STEP_S)
         now_s = self._watched_s
-        homography = self._homography(calibration)
         if not all(_in_some_image(one) for one in tracked.objects):
             usable = [one for one in tracked.objects if _in_some_image(one)]
             tracked = TrackedObjects(captured=tracked.captured, objects=usable)
+        homography = self._homography(calibration)
         self._openings.update(tracked.openings)
         hand = next((one for one in tracked.objects if one.kind == TrackedObject.KIND_HAND), None)
         gestures: list[Gesture] = []
@@ -110,6 +112,10 @@ class Recognizer:
             transitions += [
                 (name, transition) for transition in self._objects[name].update(detected.get(name), now_s, near)
             ]
+        for one in tracked.objects:
+            motion = self._objects.get(one.name)
+            if motion is not None and motion.rests_in_clear_view(detected[one.name]):
+                self._outlines[one.name] = one.outline
         return transitions
 
     def _pointed_at(
@@ -134,11 +140,9 @@ class Recognizer:
             return None
         if self._calibrated is None or self._calibrated[0] != calibration:
             homography = PlaneHomography.from_message(calibration)
-            self._calibrated, self._plane_height = (calibration, homography), 0.0
-            last = self._last_detected.get(homography.object_name)
-            if last is not None:
-                full = self._full_size.expected(homography.object_name, last.u_px, last.v_px)
-                self._plane_height = _size(full, last.u_px, last.v_px, homography)[1]
+            self._calibrated = (calibration, homography)
+            shape = self._shape_of(homography.object_name, homography)
+            self._plane_height = 0.0 if shape is None else shape.height
         return self._calibrated[1]
 
     def _gesture(
@@ -156,16 +160,21 @@ class Recognizer:
             if transition.in_motion:
                 self._put_over_opening(gesture, homography)
             gesture.located, gesture.frame = True, homography.plane_frame
-            motion, full = self._objects[name], self._full_size.expected(name, gesture.u_px, gesture.v_px)
-            height = _size(full, gesture.u_px, gesture.v_px, homography)[1]
-            depth = (self._plane_height - height) / 2 if height and self._plane_height else 0.0
-            depth = depth if abs(depth) > HEIGHTS_DIFFER / 2 else 0.0
+            depth, shape = 0.0, self._shape_of(name, homography)
+            if shape is not None:
+                gesture.width_m, gesture.height_m = shape.width, shape.height
+                if shape.turn is not None:
+                    gesture.turn_rad = shape.turn
+                lower = (self._plane_height or shape.height) - shape.height
+                depth = lower / 2 if abs(lower) > HEIGHTS_DIFFER else 0.0
             gesture.x, gesture.y = homography.below_plane(gesture.u_px, gesture.v_px, depth)
-            if motion.state is State.RESTING and motion.position is not None:
-                full = motion.position.size  # it may have been exchanged
-            gesture.width_m, gesture.height_m = _size(full, gesture.u_px, gesture.v_px, homography)
         gesture.twin = any(one.twin for one in tracked.objects if one.name == name)
         return gesture
+
+    def _shape_of(self, name: str, homography: PlaneHomography) -> UprightShape | None:
+        """As it looked when it last rested in clear view."""
+        outline = [(point.u_px, point.v_px) for point in self._outlines.get(name, ())]
+        return upright_shape(np.array(outline), homography)
 
     def _put_over_opening(self, gesture: Gesture, homography: PlaneHomography) -> None:
         """Moves a gesture over an opening to where an object with its foot in the opening's middle would be detected.
@@ -180,24 +189,6 @@ class Recognizer:
         opening = self._openings.at(gesture.u_px + du, gesture.v_px + dv)
         if opening is not None:
             gesture.u_px, gesture.v_px, gesture.confidence = opening[0] - du, opening[1] - dv, 1.0
-
-
-def _size(seen: Size | None, u_px: float, v_px: float, homography: PlaneHomography) -> tuple[float, float]:
-    """Width and height, m, of an upright object as it looks at (u, v); 0 if that is not known.
-
-    Its region is as high as its axis, foreshortened, and the circles at its ends, to where they are half as wide.
-    A lean changes neither its area nor its height.
-    """
-    if seen is None:
-        return 0.0, 0.0
-    slant = math.hypot(1.0, seen.lean)
-    across_px = seen.area_px / seen.height_px
-    sides = (u_px - across_px / slant / 2, u_px + across_px / slant / 2)
-    width = math.dist(*(homography.plane_from_image(side, v_px) for side in sides))
-    ends_px = math.sqrt(3) / 2 * homography.foreshortening(u_px, v_px) * across_px
-    sine = min(homography.sine_of_elevation(u_px, v_px), MAX_SINE)
-    axis_px = slant * max(0.0, seen.height_px - ends_px)
-    return width, axis_px * width / (across_px / slant * math.sqrt(1.0 - sine**2))
 
 
 class _HandPresence:

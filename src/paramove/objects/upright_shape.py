@@ -1,0 +1,67 @@
+"""Shape and size of an upright object from its outline: round or with a square foot, how wide, how high, how turned.
+
+Near a point the camera is taken as a parallel projection. Then the outline of a prism is the (Minkowski) sum of its
+foot, as the homography maps it, and of its height along the image of the vertical; and the width of a sum across any
+direction is the sum of both widths. So for a round foot, and for a square one of each angle, the widths of the outline
+in all directions are linear in width and height of the object. The foot that fits best is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramove.documents import Floats
+from paramove.objects.homography import PlaneHomography
+
+_DIRECTIONS = np.deg2rad(np.arange(0.0, 180.0, 7.5))
+_ACROSS = np.column_stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
+_TURNS = np.deg2rad(np.arange(0.0, 90.0, 3.0))
+_PIXEL = 0.7
+"""Outlines run through the middles of the outermost pixels, half a pixel inside straight edges."""
+MAX_SINE = 0.98
+"""Of the camera's elevation: one that is higher up does not see how high an object is."""
+
+
+@dataclass(frozen=True)
+class UprightShape:
+    """Attributes:
+    width: Diameter of a round foot, side of a square one, m.
+    height: m.
+    turn: Of a square foot: from x to one of its sides, 0 to π/2, rad, frame of the plane; None: it is round.
+    """
+
+    width: float
+    height: float
+    turn: float | None = None
+
+
+def upright_shape(outline: Floats, homography: PlaneHomography) -> UprightShape | None:
+    """Of a wholly visible object with this outline, [M, 2], px; None if that is not the outline of a solid.
+
+    Args:
+        homography: Of the plane of the object's middle, or of one near to it.
+    """
+    if len(outline) < 3:
+        return None
+    u, v = (float(middle) for middle in (outline.min(axis=0) + outline.max(axis=0)) / 2)
+    image_from_plane = homography.image_directions(u, v)
+    _, (largest, smallest), directions = np.linalg.svd(image_from_plane)
+    up = image_from_plane @ directions[1] / smallest
+    cosine = math.sqrt(1.0 - min(smallest / largest, MAX_SINE) ** 2)
+    along = outline @ _ACROSS.T
+    widths = along.max(axis=0) - along.min(axis=0) + _PIXEL
+    of_height = cosine * largest * np.abs(_ACROSS @ up)
+    in_plane = _ACROSS @ image_from_plane
+    feet = [np.linalg.norm(in_plane, axis=1)]
+    for turn in _TURNS:
+        side = np.array([math.cos(turn), math.sin(turn)])
+        feet.append(np.abs(in_plane @ side) + np.abs(in_plane @ [-side[1], side[0]]))
+    fits = [np.linalg.lstsq(np.column_stack([foot, of_height]), widths, rcond=None)[:2] for foot in feet]
+    best = min(range(len(fits)), key=lambda number: float(fits[number][1][0]))
+    width, height = (float(size) for size in fits[best][0])
+    if width <= 0.0 or height <= 0.0:
+        return None
+    return UprightShape(width, height, float(_TURNS[best - 1]) if best else None)
