@@ -21,6 +21,7 @@ Mishap = Literal[
     "two_of_one_colour",
     "too_wide",
     "too_tall",
+    "fallen",
     "covered_opening",
     "moved_camera",
     "moved_base",
@@ -70,6 +71,8 @@ class Mishaps:
         elif kind == "out_of_reach":
             yield from hand.bring(name, FAR)
             yield from hand.withdraw()
+        elif kind == "fallen":
+            self._world.lay(name)
         elif kind == "covered_opening":
             self._cover(name)
         elif kind in ("moved_camera", "moved_base"):

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
 from paramove.robots import RobotDescription
@@ -147,9 +148,20 @@ class World:
 
     def place(self, name: str, centre: Floats) -> None:
         """Put an object upright at `centre`, at rest: to set a scene, not part of any story."""
-        joint, half = self.model.joint(name), self._turns[name] / 2 if self.shapes[name].kind == "block" else 0.0
-        turn = (math.cos(half), 0.0, 0.0, math.sin(half))
-        self.data.qpos[joint.qposadr[0] : joint.qposadr[0] + 7] = (*(centre + self.world_from_shoulder), *turn)
+        half = self._turns[name] / 2 if self.shapes[name].kind == "block" else 0.0
+        self._put(name, centre, (math.cos(half), 0.0, 0.0, math.sin(half)))
+
+    def lay(self, name: str) -> None:
+        """Lay an object on its side where it stands, turned somehow, at rest."""
+        shape, (x, y, z), half = self.shapes[name], self.position(name), self._turns[name] / 2
+        turn = _multiply(np.array((math.cos(half), 0.0, 0.0, math.sin(half))), np.array((0.5**0.5, 0.5**0.5, 0.0, 0.0)))
+        self._put(name, np.array((x, y, z - shape.half_height + shape.half_width)), turn)
+
+    def _put(self, name: str, centre: Floats, quaternion: ArrayLike) -> None:
+        joint = self.model.joint(name)
+        first = joint.qposadr[0]
+        self.data.qpos[first : first + 3] = centre + self.world_from_shoulder
+        self.data.qpos[first + 3 : first + 7] = quaternion
         self.data.qvel[joint.dofadr[0] : joint.dofadr[0] + 6] = 0.0
 
     # -- instructor -------------------------------------------------------------------------------------------------

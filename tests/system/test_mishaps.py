@@ -10,8 +10,9 @@ SAID = {
     "out_of_reach": "I cannot reach",
     "slippery": "Please put it to another place",
     "two_of_one_colour": "I see more than one",
-    "too_wide": "mm wide; this gripper holds",
+    "too_wide": "mm wide as it stands; this gripper holds",
     "too_tall": "mm high; the arm moves objects of 50 mm",
+    "fallen": "Please",
     "covered_opening": "Please uncover the opening",
     "moved_camera": "Was the camera moved, or my base? I calibrate again",
     "moved_base": "Was the camera moved, or my base? I calibrate again",
@@ -23,6 +24,7 @@ SAID = {
     [
         ("koch_v1_1", 7, ("out_of_reach", "two_of_one_colour", "too_wide")),
         ("open_manipulator_x", 7, ("covered_opening", "too_tall", "hand_in_the_way")),
+        ("open_manipulator_x", 9, ("fallen", "fallen")),
         ("koch_v1_1", 6, ("slippery", "moved_camera")),
         ("koch_v1_1", 8, ("slippery", "moved_base")),
     ],
