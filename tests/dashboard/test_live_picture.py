@@ -80,6 +80,17 @@ def test_objects_are_where_the_robot_believes_them() -> None:
     assert_allclose(objects["yellow"]["place"], plane.plane_from_image(u, v), rtol=0, atol=1e-4)
 
 
+def test_objects_are_drawn_as_they_were_seen() -> None:
+    block = Gesture(kind=Gesture.KIND_RESTED, object="green", width_m=0.028, height_m=0.0275, turn_rad=0.4)
+    round_one = Gesture(kind=Gesture.KIND_RESTED, object="blue", width_m=0.022, height_m=0.05)
+    gone = Gesture(kind=Gesture.KIND_VANISHED, object="blue")
+    unknown = Gesture(kind=Gesture.KIND_RESTED, object="yellow")
+    found = sections(*((topics.GESTURES, one) for one in (block, round_one, gone, unknown)))["objects"]
+    assert found["green"]["size"] == {"width": 0.028, "height": 0.0275, "turn": 0.4}
+    assert found["blue"]["size"] == {"width": 0.022, "height": 0.05, "turn": None}
+    assert found["yellow"]["size"] is None
+
+
 def test_what_vanishes_beside_the_surface_is_not_in_an_opening() -> None:
     gone = Gesture(kind=Gesture.KIND_VANISHED, object="blue", located=True, x=0.5, y=0.0)
     found = sections((topics.GESTURES, gone))["objects"]["blue"]

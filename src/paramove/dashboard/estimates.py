@@ -40,6 +40,7 @@ class _Object:
     state: str = "not detected yet"
     detected: tuple[float, float] | None = None  # m, plane's frame
     put: tuple[float, float] | None = None  # where the robot itself put it down
+    size: dict[str, float | None] | None = None  # width, height, m; turn of a square foot, rad, or None
 
 
 class Estimates:
@@ -109,6 +110,9 @@ class Estimates:
             known = self._objects.setdefault(gesture.object, _Object())
             known.state = _GESTURES[gesture.kind]
             known.detected = (gesture.x, gesture.y) if gesture.located else None
+            if gesture.height_m:
+                turn = round(gesture.turn_rad, 3) if gesture.HasField("turn_rad") else None
+                known.size = {"width": round(gesture.width_m, 4), "height": round(gesture.height_m, 4), "turn": turn}
             if gesture.located and known.state != "gone":
                 known.put = None  # it was detected elsewhere than where the robot put it
 
@@ -167,7 +171,9 @@ class Estimates:
 
     def _object(self, name: str) -> dict[str, Any]:
         known, rule = self._objects[name], self._rules.get(name)
-        position, state = self._detected_now(name) or known.detected or known.put, known.state
+        at_rest = known.detected if known.state == "stands" and known.size else None  # its height is accounted for
+        position = at_rest or self._detected_now(name) or known.detected or known.put
+        state = known.state
         if name == self.held:
             position, state = None, IN_HAND
         elif state == "gone" and known.put is not None:  # the hand hid how it was put in
@@ -178,6 +184,7 @@ class Estimates:
         return {
             "state": state,
             "place": _position_2d(position),
+            "size": known.size,
             "rule": rule and {**rule, "place": _position_2d((rule["x"], rule["y"]))},
         }
 

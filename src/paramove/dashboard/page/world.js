@@ -160,19 +160,26 @@ export class WorldView {
     });
   }
 
-  // Where an object is drawn: middle of its cylinder, world frame; null where there is no estimate.
+  // As it was seen, or as objects usually are.
+  sizeOf(object) {
+    const { radius, height } = this.state.world.object;
+    return object.size ?? { width: 2 * radius, height, turn: null };
+  }
+
+  // Where an object is drawn: its middle, world frame; null where there is no estimate.
   placeOf(object) {
-    const { world, robot } = this.state, [sx, sy, sz] = world.shoulder, z = sz + world.surface.z + world.object.height / 2;
+    const { world, robot } = this.state, [sx, sy, sz] = world.shoulder, z = sz + world.surface.z + this.sizeOf(object).height / 2;
     if (object.state === "in the robot's hand") return robot.gripper ?? null;
     if (!object.place) return null;
     return [sx + object.place[0], sy + object.place[1], object.state === "in an opening" ? z - SUNK : z];
   }
 
   objects() {
-    const { world, objects } = this.state, { radius, height } = world.object;
-    return Object.entries(objects).flatMap(([name, object]) => {
-      const place = this.placeOf(object);
-      return place ? [["cylinder", multiply(moved(...place), scaled(radius, radius, height / 2)), colourOf(name)]] : [];
+    return Object.entries(this.state.objects).flatMap(([name, object]) => {
+      const place = this.placeOf(object), { width, height, turn } = this.sizeOf(object), half = (turn ?? 0) / 2;
+      if (!place) return [];
+      const upright = multiply(rigid(place, [Math.cos(half), 0, 0, Math.sin(half)]), scaled(width / 2, width / 2, height / 2));
+      return [[turn === null ? "cylinder" : "box", upright, colourOf(name)]];
     });
   }
 
@@ -227,7 +234,7 @@ export class WorldView {
   }
 
   names() {
-    const shown = new Set(), { world, objects } = this.state, rect = this.canvas;
+    const shown = new Set(), { objects } = this.state, rect = this.canvas;
     const show = (key, text, [x, y, z]) => {
       const m = this.camera, [a, b, , w] = [0, 1, 2, 3].map((r) => m[r] * x + m[4 + r] * y + m[8 + r] * z + m[12 + r]);
       if (w <= 0) return;
@@ -240,7 +247,7 @@ export class WorldView {
     };
     for (const [name, object] of Object.entries(objects)) {
       const place = this.placeOf(object);
-      if (place) show(name, name, [place[0], place[1], place[2] + world.object.height / 2]);
+      if (place) show(name, name, [place[0], place[1], place[2] + this.sizeOf(object).height / 2]);
     }
     for (const [key, span] of this.spans) if (!shown.has(key)) { span.remove(); this.spans.delete(key); }
   }
