@@ -1,12 +1,13 @@
 """Latency and losses of the bus.
 
-    python benchmarks/bus.py [--seconds 5] [--json FILE]
+    python benchmarks/bus.py [--seconds 5] [--images] [--json FILE]
     python benchmarks/bus.py --soak 600 [--variant healthy|sleeping|stopped|all] [--json FILE]
 
-The first measures the latency at 1 kHz with messages of 216 bytes. One process publishes, another subscribes; both read
-the same monotonic clock. `raw` sends the same bytes with libzmq PUB and SUB and nothing else, so the difference is what
-the envelope, its checks and the protobuf decoding cost. rospy (with a roscore running), zenoh and LCM follow where they
-are installed, each as it comes.
+The first measures the latency at 1 kHz with messages of 216 bytes, or with images of 1 MB, 30 a second. One process
+publishes, another subscribes; both read the same monotonic clock. `raw` sends the same bytes with libzmq PUB and SUB
+and nothing else, so the difference is what the envelope, its checks and the protobuf decoding cost, and of images what
+shared memory saves. rospy (with a roscore running), zenoh, LCM and iceoryx2 follow where they are installed, each as it
+comes.
 
 The second publishes 1000 such messages and 30 images of 1 MB a second to two subscribers, and to a third one that
 sleeps or is stopped, and compares what they have counted with what was published.
@@ -25,6 +26,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,43 +34,44 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # run as a prog
 
 import zmq
 
-from benchmarks.bus_peers import PAYLOAD_BYTES, PEERS, describe, installed, paced
+from benchmarks.bus_peers import IMAGES, PEERS, SMALL, Load, describe, installed, paced, stamped
 from benchmarks.bus_soak import VARIANTS, batch, soak, summary_text
 from paramove.bus import Publisher, Subscriber, topics
 
+TOPICS = {SMALL: topics.WIRE_HOAP3_STREAM, IMAGES: replace(topics.CAMERA_IMAGE_RAW, rate_hz=30)}
 
-def publish_bus(folder: Path, messages: int) -> None:
+
+def publish_bus(folder: Path, messages: int, load: Load) -> None:
     """The publisher of the bus: waits for its subscriber, then publishes."""
     context: zmq.Context[Any] = zmq.Context()
-    publisher = Publisher(context, folder, topics.WIRE_HOAP3_STREAM, "speaker")
+    publisher = Publisher(context, folder, TOPICS[load], "speaker")
     while publisher.subscriptions == 0:
         publisher.socket.poll()
         publisher.serve()
-    message = batch()
-    for _ in paced(messages):
+    message = batch() if load is SMALL else TOPICS[load].type(data=b"\1" * load.size)
+    for _ in paced(messages, load.period_ns):
         now_ns = time.monotonic_ns()
         publisher.publish(message, now_ns, now_ns)
     publisher.close()
     context.term()
 
 
-def publish_raw(folder: Path, messages: int) -> None:
+def publish_raw(folder: Path, messages: int, load: Load) -> None:
     """The publisher of ZeroMQ alone."""
     context: zmq.Context[Any] = zmq.Context()
     socket = context.socket(zmq.XPUB)
     socket.bind(f"ipc://{folder / 'raw'}")
     socket.recv()
-    filler = b"\0" * (PAYLOAD_BYTES - 8)
-    for _ in paced(messages):
-        socket.send(struct.pack("<q", time.monotonic_ns()) + filler)
+    for _ in paced(messages, load.period_ns):
+        socket.send(stamped(load.size))
     socket.close(linger=1000)
     context.term()
 
 
-def subscribe_bus(folder: Path, messages: int) -> tuple[list[int], int]:
+def subscribe_bus(folder: Path, messages: int, load: Load) -> tuple[list[int], int]:
     """Latencies in ns, and how many messages were lost."""
     context: zmq.Context[Any] = zmq.Context()
-    subscriber = Subscriber(context, folder, topics.WIRE_HOAP3_STREAM)
+    subscriber = Subscriber(context, folder, TOPICS[load])
     latencies: list[int] = []
     while subscriber.counter.messages + subscriber.counter.lost < messages and subscriber.socket.poll(5000):
         received = subscriber.receive(ready=True)  # as the bus does it
@@ -81,7 +84,7 @@ def subscribe_bus(folder: Path, messages: int) -> tuple[list[int], int]:
     return latencies, lost
 
 
-def subscribe_raw(folder: Path, messages: int) -> tuple[list[int], int]:
+def subscribe_raw(folder: Path, messages: int, load: Load) -> tuple[list[int], int]:
     """Latencies in ns, and how many messages were lost."""
     context: zmq.Context[Any] = zmq.Context()
     socket = context.socket(zmq.SUB)
@@ -97,21 +100,28 @@ def subscribe_raw(folder: Path, messages: int) -> tuple[list[int], int]:
     return latencies, messages - len(latencies)
 
 
-def measure(kind: str, handle: Callable[[Path, int], tuple[list[int], int]], messages: int) -> dict[str, Any]:
+def measure(
+    kind: str, handle: Callable[[Path, int, Load], tuple[list[int], int]], messages: int, load: Load
+) -> dict[str, Any]:
     """Starts the publisher in a process of its own and subscribes in this one."""
-    with tempfile.TemporaryDirectory(prefix="bus-") as folder:
-        command = [sys.executable, __file__, "--publish", kind, "--folder", folder, "--messages", str(messages)]
-        with subprocess.Popen(command):
-            latencies, lost = handle(Path(folder), messages)
-    return summary(kind, latencies, lost)
+    with (
+        tempfile.TemporaryDirectory(prefix="bus-") as folder,
+        subprocess.Popen(_publishing(kind, folder, messages, load)),
+    ):
+        latencies, lost = handle(Path(folder), messages, load)
+    return summary(kind, latencies, lost, load)
 
 
-def measure_peer(kind: str, messages: int) -> dict[str, Any]:
+def _publishing(kind: str, folder: str, messages: int, load: Load) -> list[str]:
+    command = [sys.executable, __file__, "--publish", kind, "--folder", folder, "--messages", str(messages)]
+    return [*command, "--images"] if load is IMAGES else command
+
+
+def measure_peer(kind: str, messages: int, load: Load) -> dict[str, Any]:
     """The same for another bus; its error instead of numbers if it does not work here."""
     if not installed(kind):
         return {"kind": kind, "note": "not installed"}
-    command = [sys.executable, __file__, "--publish", kind, "--folder", ".", "--messages", str(messages)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE) as publisher:
+    with subprocess.Popen(_publishing(kind, ".", messages, load), stdin=subprocess.PIPE) as publisher:
         assert publisher.stdin is not None
 
         def go() -> None:
@@ -120,7 +130,7 @@ def measure_peer(kind: str, messages: int) -> dict[str, Any]:
             publisher.stdin.flush()
 
         try:
-            latencies = PEERS[kind][1](messages, go)
+            latencies = PEERS[kind][1](messages, load, go)
         except Exception as error:
             return {"kind": kind, "note": describe(error)}
         finally:
@@ -128,16 +138,16 @@ def measure_peer(kind: str, messages: int) -> dict[str, Any]:
             publisher.terminate()
     if not latencies:
         return {"kind": kind, "note": "installed, but no message arrived"}
-    return summary(kind, latencies, messages - len(latencies))
+    return summary(kind, latencies, messages - len(latencies), load)
 
 
-def summary(kind: str, latencies: list[int], lost: int) -> dict[str, Any]:
+def summary(kind: str, latencies: list[int], lost: int, load: Load) -> dict[str, Any]:
     """The numbers of one measurement; latencies in ns."""
     latencies.sort()
     return {
         "kind": kind,
         "messages": len(latencies) + lost,
-        "payload_bytes": PAYLOAD_BYTES,
+        "payload_bytes": load.size,
         "lost": lost,
         "p50_us": round(statistics.median(latencies) * 1e-3, 1),
         "p99_us": round(latencies[int(0.99 * len(latencies))] * 1e-3, 1),
@@ -145,15 +155,15 @@ def summary(kind: str, latencies: list[int], lost: int) -> dict[str, Any]:
     }
 
 
-def latency(seconds: float) -> list[dict[str, Any]]:
+def latency(seconds: float, load: Load) -> list[dict[str, Any]]:
     """Measures everything once and prints it."""
-    messages = int(1000 * seconds)
+    messages = int(seconds * 1e9 / load.period_ns)
     results = []
     for kind in ("raw", "bus", *PEERS):
         if kind in PEERS:
-            result = measure_peer(kind, messages)
+            result = measure_peer(kind, messages, load)
         else:
-            result = measure(kind, {"raw": subscribe_raw, "bus": subscribe_bus}[kind], messages)
+            result = measure(kind, {"raw": subscribe_raw, "bus": subscribe_bus}[kind], messages, load)
         results.append(result)
         if "note" in result:
             sys.stdout.write(f"{kind:6} {result['note']}\n")
@@ -169,6 +179,7 @@ def latency(seconds: float) -> list[dict[str, Any]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seconds", type=float, default=5.0, help="of each measurement of latency")
+    parser.add_argument("--images", action="store_true", help="measure the latency of images")
     parser.add_argument("--soak", type=float, metavar="SECONDS", help="measure losses instead, for so long")
     parser.add_argument("--variant", choices=[*VARIANTS, "all"], default="healthy", help="of the soak")
     parser.add_argument("--json", type=Path, help="also write the results here")
@@ -176,11 +187,12 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--messages", type=int, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
+    load = IMAGES if arguments.images else SMALL
     if arguments.publish in PEERS:
-        PEERS[arguments.publish][0](arguments.messages)
+        PEERS[arguments.publish][0](arguments.messages, load)
         return
     if arguments.publish:
-        {"bus": publish_bus, "raw": publish_raw}[arguments.publish](arguments.folder, arguments.messages)
+        {"bus": publish_bus, "raw": publish_raw}[arguments.publish](arguments.folder, arguments.messages, load)
         return
     if arguments.soak:
         results = []
@@ -189,7 +201,7 @@ def main() -> None:
             sys.stdout.write(summary_text(results[-1]))
             sys.stdout.flush()
     else:
-        results = latency(arguments.seconds)
+        results = latency(arguments.seconds, load)
     if arguments.json:
         content = {"cpus": os.cpu_count(), "libzmq": zmq.zmq_version(), "results": results}
         arguments.json.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

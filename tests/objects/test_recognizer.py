@@ -195,3 +195,11 @@ def test_an_image_that_is_not_newer_is_ignored() -> None:
 def test_refuses_a_calibration_without_homography() -> None:
     with pytest.raises(HomographyError, match="nine finite"):
         Recognizer().update(image_of(1, standing("blue", 200, 150)), PlaneCalibration(plane_from_image=[1.0]))
+
+
+def test_a_hand_with_the_name_of_an_object_does_no_harm() -> None:
+    play = _resting(("blue", 200, 150))
+    hand = hand_with_tip(300, 200)
+    hand.name = "blue"
+    play.show(hand, ticks=2).show(standing("blue", 200, 150), ticks=20)
+    assert play.kinds("blue") == ["APPEARED"]

@@ -41,6 +41,8 @@ FLAG_WELCOME = 1
 """Sent because somebody subscribed; the sequence is that of the latest message published so far."""
 FLAG_LAST_VALUE = 2
 """With FLAG_WELCOME: the payload is the latest message, sent again. Without: a welcome has no message in it."""
+FLAG_RING = 4
+"""The payload is a handle; the message lies in the publisher's ring (see `paramove.bus.image_ring`)."""
 
 
 class Reason(enum.Enum):
@@ -58,6 +60,7 @@ class Reason(enum.Enum):
     BUDGET = "budget"
     DECODE = "decode"
     NUMBER = "number"
+    RING = "ring"
 
 
 class RejectedError(Exception):

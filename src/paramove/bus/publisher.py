@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import secrets
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,8 @@ from typing import Any
 import zmq
 
 from paramove.bus.endpoint import Ownership, can_read, prepare_folder, socket_path
-from paramove.bus.envelope import FLAG_LAST_VALUE, FLAG_WELCOME, Envelope, pack, publisher_id
+from paramove.bus.envelope import FLAG_LAST_VALUE, FLAG_RING, FLAG_WELCOME, Envelope, pack, publisher_id
+from paramove.bus.image_ring import SMALLEST, RingWriter
 from paramove.bus.monitor import ForeignConnections
 from paramove.bus.schemas import schema_hash
 from paramove.bus.topics import Profile, Topic
@@ -61,6 +63,7 @@ class Publisher:
         self._schema = schema_hash(topic.type)
         self._publisher = publisher_id(node)
         self._last: tuple[Envelope, bytes] | None = None
+        self._ring = RingWriter() if topic.by_ring else None
         self.socket: zmq.Socket[Any] = context.socket(zmq.XPUB)
         self.socket.setsockopt(zmq.XPUB_VERBOSE, 1)
         self.socket.setsockopt(zmq.SNDHWM, topic.publisher_high_water_mark)
@@ -89,6 +92,9 @@ class Publisher:
         envelope = Envelope(self._schema, self._publisher, self.epoch, self.sequence, now_ns, captured_ns)
         if self.topic.profile is Profile.LATCHED:
             self._last = (envelope, payload)
+        if self._ring is not None and len(payload) >= SMALLEST:
+            with contextlib.suppress(OSError):  # no memory: by the socket, as smaller ones
+                payload, envelope = self._ring.write(payload, envelope), envelope._replace(flags=FLAG_RING)
         self._send(envelope, payload)
         self.serve()
         return self.sequence
@@ -105,6 +111,8 @@ class Publisher:
         """Closes the socket; messages already published are still delivered for `LINGER_MS`."""
         self.foreign.close()
         self.socket.close()
+        if self._ring is not None:
+            self._ring.close()
 
     def _welcome(self) -> None:
         if self._last is not None:

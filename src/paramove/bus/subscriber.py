@@ -13,7 +13,8 @@ from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 
 from paramove.bus.budget import ALLOWANCE, BURST, RateBudget
 from paramove.bus.endpoint import can_read, holder_of, socket_path
-from paramove.bus.envelope import SIZE, Envelope, Reason, RejectedError, unpack
+from paramove.bus.envelope import FLAG_RING, SIZE, Envelope, Reason, RejectedError, unpack
+from paramove.bus.image_ring import OverwrittenError, RingReader
 from paramove.bus.monitor import Monitor
 from paramove.bus.schemas import schema_hash
 from paramove.bus.sequence import Arrival, SequenceCounter
@@ -74,6 +75,7 @@ class Subscriber:
         self._frame = self.name.encode() + b"\0"
         self._schema = schema_hash(topic.type)
         self._disconnected_s: float | None = None
+        self._ring = RingReader()
         self._open()
 
     @property
@@ -118,6 +120,8 @@ class Subscriber:
                 envelope, payload = self._read()
             except RejectedError as error:
                 self._reject(error)
+                continue
+            except OverwrittenError:  # the gap in the sequence counts it
                 continue
             except zmq.Again:
                 return None
@@ -168,6 +172,7 @@ class Subscriber:
         """Closes the socket; messages not yet received are gone."""
         self._monitor.close()
         self.socket.close(linger=0)
+        self._ring.close()
 
     def _open(self) -> None:
         self._disconnected_s = None
@@ -198,7 +203,10 @@ class Subscriber:
             frames += 1
         if frames != 2 or not head.startswith(self._frame):
             raise RejectedError(Reason.FRAMES, f"{frames} frames, expected 2: topic and header, payload")
-        return unpack(head[len(self._frame) :], payload, self._schema, self.topic.max_bytes), payload
+        envelope = unpack(head[len(self._frame) :], payload, self._schema, self.topic.max_bytes)
+        if envelope.flags & FLAG_RING:
+            payload = self._ring.read(payload, envelope, self.topic.max_bytes)
+        return envelope, payload
 
     def _decode(self, payload: bytes) -> Any:
         try:

@@ -81,6 +81,11 @@ class Topic:
         return self.type in (RawImage, CompressedImage)
 
     @property
+    def by_ring(self) -> bool:
+        """Whether large messages go by shared memory, in which a reader that is slow by a second loses some."""
+        return self.is_image and self.profile is Profile.LATEST and not self.recorded
+
+    @property
     def budget_hz(self) -> float | None:
         """Nominal rate by the messages' own publish times, which a subscriber enforces; None where there is none.
 

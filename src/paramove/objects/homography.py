@@ -102,6 +102,8 @@ class PlaneHomography:
         By a parallel projection near (u, v), of a camera that is not upside down.
         """
         x, y = self.plane_from_image(u_px, v_px)
+        if depth == 0.0:
+            return x, y
         directions = self.image_directions(u_px, v_px)
         _, (largest, smallest), axes = np.linalg.svd(directions)
         away = -np.sign((directions @ axes[1])[1]) * axes[1]  # foreshortened most; up in the image

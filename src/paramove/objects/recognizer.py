@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -113,8 +114,7 @@ class Recognizer:
                 (name, transition) for transition in self._objects[name].update(detected.get(name), now_s, near)
             ]
         for one in tracked.objects:
-            motion = self._objects.get(one.name)
-            if motion is not None and motion.rests_in_clear_view(detected[one.name]):
+            if one.name in detected and self._objects[one.name].rests_in_clear_view(detected[one.name]):
                 self._outlines[one.name] = one.outline
         return transitions
 
@@ -174,7 +174,9 @@ class Recognizer:
     def _shape_of(self, name: str, homography: PlaneHomography) -> UprightShape | None:
         """As it looked when it last rested in clear view."""
         outline = [(point.u_px, point.v_px) for point in self._outlines.get(name, ())]
-        return upright_shape(np.array(outline), homography)
+        with contextlib.suppress(ValueError):  # on the plane's horizon
+            return upright_shape(np.array(outline), homography)
+        return None
 
     def _put_over_opening(self, gesture: Gesture, homography: PlaneHomography) -> None:
         """Moves a gesture over an opening to where an object with its foot in the opening's middle would be detected.

@@ -43,6 +43,8 @@ def upright_shape(outline: Floats, homography: PlaneHomography) -> UprightShape 
 
     Args:
         homography: Of the plane of the object's middle, or of one near to it.
+
+    Raises ValueError if the outline lies on the plane's horizon.
     """
     if len(outline) < 3:
         return None
@@ -59,9 +61,11 @@ def upright_shape(outline: Floats, homography: PlaneHomography) -> UprightShape 
     for turn in _TURNS:
         side = np.array([math.cos(turn), math.sin(turn)])
         feet.append(np.abs(in_plane @ side) + np.abs(in_plane @ [-side[1], side[0]]))
-    fits = [np.linalg.lstsq(np.column_stack([foot, of_height]), widths, rcond=None)[:2] for foot in feet]
-    best = min(range(len(fits)), key=lambda number: float(fits[number][1][0]))
-    width, height = (float(size) for size in fits[best][0])
+    designs = [np.column_stack([foot, of_height]) for foot in feet]
+    sizes = [np.linalg.lstsq(design, widths, rcond=None)[0] for design in designs]
+    errors = [float(np.linalg.norm(design @ size - widths)) for design, size in zip(designs, sizes, strict=True)]
+    best = int(np.argmin(errors))
+    width, height = (float(size) for size in sizes[best])
     if width <= 0.0 or height <= 0.0:
         return None
     return UprightShape(width, height, float(_TURNS[best - 1]) if best else None)
