@@ -80,6 +80,8 @@ class ObjectMotion:
         """The best view of the object at rest."""
         self.blind = False
         """There was a gap in the images after the object was last clearly visible."""
+        self.stands = False
+        """It has rested for so long that no gripper holds it up, as of the latest call of `is_best_view`."""
         self._full_size = full_size
         self._limits = thresholds
         self._history: deque[Sample] = deque()
@@ -88,6 +90,7 @@ class ObjectMotion:
         self._reported_area_px = 0.0
         self._clearly_visible_s = 0.0
         self._rests_since_s = 0.0
+        self._best_visible = 0.0
 
     def update(self, sample: Sample | None, now_s: float, hand_near: bool) -> list[Transition]:
         """Processes one frame: the object's sample in it or None.
@@ -111,9 +114,16 @@ class ObjectMotion:
         """Visible fraction of the object's full area, 0 to 1."""
         return self._full_size.visible_fraction(self.name, sample.u_px, sample.v_px, sample.area_px)
 
-    def rests_in_clear_view(self, sample: Sample) -> bool:
-        """Whether it is at rest and nothing hides it in this sample."""
-        return self.state is State.RESTING and self.visible_fraction(sample) >= self._limits.clear_share
+    def is_best_view(self, sample: Sample) -> bool:
+        """Whether nothing hides it in this sample, less than ever since it came to rest, or has stood."""
+        stands = self.state is State.RESTING and sample.time_s - self._rests_since_s >= self._limits.stands_s
+        if self.state is not State.RESTING or stands != self.stands:
+            self.stands, self._best_visible = stands, 0.0
+        visible = self.visible_fraction(sample)
+        if self.state is not State.RESTING or visible < max(self._limits.clear_share, self._best_visible):
+            return False
+        self._best_visible = visible
+        return True
 
     def _unseen(self, now_s: float, hand_near: bool) -> list[Transition]:
         self._displaced_since = self._still_since = None

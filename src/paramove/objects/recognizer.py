@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
-from paramove.msgs.tracked_objects_pb2 import OutlinePoint, TrackedObject, TrackedObjects
+from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.objects.full_size import FullSize
 from paramove.objects.homography import PlaneHomography
 from paramove.objects.object_motion import MotionThresholds, ObjectMotion, State, Transition
@@ -26,6 +25,8 @@ BLIND_S = 0.35
 LONGEST_STEP_S = 0.2
 """Maximum observation time that one image counts for."""
 MAX_PX = 1e6
+LARGER = 1.05
+"""Of the width of a standing object, from which it is held up, nearer to the camera."""
 HEIGHTS_DIFFER = 0.007
 """m; less can be the error of two heights that are measured in an image."""
 CLOCK_BACK_S = 5.0
@@ -56,7 +57,8 @@ class Recognizer:
         self._hand = _HandPresence()
         self._calibrated: tuple[PlaneCalibration, PlaneHomography] | None = None
         self._plane_height = 0.0
-        self._outlines: dict[str, Sequence[OutlinePoint]] = {}
+        self._outlines: dict[str, list[tuple[float, float]]] = {}
+        self._standing: dict[str, list[tuple[float, float]]] = {}
         self._latest_s: float | None = None
         self._watched_s = 0.0
 
@@ -114,8 +116,10 @@ class Recognizer:
                 (name, transition) for transition in self._objects[name].update(detected.get(name), now_s, near)
             ]
         for one in tracked.objects:
-            if one.name in detected and self._objects[one.name].rests_in_clear_view(detected[one.name]):
-                self._outlines[one.name] = one.outline
+            if one.name in detected and self._objects[one.name].is_best_view(detected[one.name]):
+                self._outlines[one.name] = outline = [(point.u_px, point.v_px) for point in one.outline]
+                if self._objects[one.name].stands:
+                    self._standing[one.name] = outline
         return transitions
 
     def _pointed_at(
@@ -172,10 +176,14 @@ class Recognizer:
         return gesture
 
     def _shape_of(self, name: str, homography: PlaneHomography) -> UprightShape | None:
-        """As it looked when it last rested in clear view."""
-        outline = [(point.u_px, point.v_px) for point in self._outlines.get(name, ())]
+        """As it looked in the clearest view of its last rest; standing, if it may have been held up then."""
         with contextlib.suppress(ValueError):  # on the plane's horizon
-            return upright_shape(np.array(outline), homography)
+            latest, standing = (
+                upright_shape(np.array(outlines.get(name, [])), homography)
+                for outlines in (self._outlines, self._standing)
+            )
+            held_up = latest is not None and standing is not None and latest.width > LARGER * standing.width
+            return standing if held_up else latest
         return None
 
     def _put_over_opening(self, gesture: Gesture, homography: PlaneHomography) -> None:

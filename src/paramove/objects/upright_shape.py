@@ -3,7 +3,7 @@
 Near a point the camera is taken as a parallel projection. Then the outline of a prism is the (Minkowski) sum of its
 foot, as the homography maps it, and of its height along the image of the vertical; and the width of a sum across any
 direction is the sum of both widths. So for a round foot, and for a square one of each angle, the widths of the outline
-in all directions are linear in width and height of the object. The foot that fits best is taken.
+in all directions are linear in width and height of the object. A square foot is taken if it fits clearly better.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ _ACROSS = np.column_stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 _TURNS = np.deg2rad(np.arange(0.0, 90.0, 3.0))
 _PIXEL = 0.7
 """Outlines run through the middles of the outermost pixels, half a pixel inside straight edges."""
+CLEARLY = 0.7
+"""Of the error of a round foot: an object is a block if a square one fits better than that."""
 MAX_SINE = 0.98
 """Of the camera's elevation: one that is higher up does not see how high an object is."""
 
@@ -64,7 +66,8 @@ def upright_shape(outline: Floats, homography: PlaneHomography) -> UprightShape 
     designs = [np.column_stack([foot, of_height]) for foot in feet]
     sizes = [np.linalg.lstsq(design, widths, rcond=None)[0] for design in designs]
     errors = [float(np.linalg.norm(design @ size - widths)) for design, size in zip(designs, sizes, strict=True)]
-    best = int(np.argmin(errors))
+    best = 1 + int(np.argmin(errors[1:]))
+    best = best if errors[best] < CLEARLY * errors[0] else 0
     width, height = (float(size) for size in sizes[best])
     if width <= 0.0 or height <= 0.0:
         return None
