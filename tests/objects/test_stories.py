@@ -36,6 +36,24 @@ def test_a_shown_rule_is_located_within_four_millimetres(seed: int, lowering_tic
     assert not moved.twin
 
 
+def test_an_object_that_is_held_up_is_not_taken_for_a_larger_one() -> None:
+    """A gripper pauses with it, nearer to the camera, for less time than one stands on the table."""
+    start, up = (0.15, -0.05, CYLINDER_HEIGHT / 2), (0.14, 0.02, 0.11)
+    with Scene(Look(), 0) as scene:
+        story = Story(scene)
+        story.calibrate()
+        scene.stand("blue", *start[:2])
+        story.step(40)
+        for centre in segment(start, up, 12):
+            scene.put("blue", tuple(centre))
+            story.step()
+        story.step(14)
+    *_, moved, rested = (gesture for gesture in story.gestures if gesture.object == "blue")
+    assert (moved.kind, rested.kind) == (Gesture.KIND_MOVED, Gesture.KIND_RESTED)
+    np.testing.assert_allclose(rested.width_m, moved.width_m, rtol=0, atol=0.001)
+    np.testing.assert_allclose(rested.height_m, moved.height_m, rtol=0, atol=0.003)
+
+
 @pytest.mark.parametrize("seed", [3, 7])
 def test_the_object_that_the_finger_is_near_is_pointed_at(seed: int) -> None:
     places = {"yellow": (0.14, -0.10), "green": (0.17, -0.03), "blue": (0.13, 0.05)}
