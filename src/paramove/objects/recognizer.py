@@ -25,8 +25,8 @@ BLIND_S = 0.35
 LONGEST_STEP_S = 0.2
 """Maximum observation time that one image counts for."""
 MAX_PX = 1e6
-LARGER = 1.05
-"""Of the width of a standing object, from which it is held up, nearer to the camera."""
+LARGER = 1.1
+"""Of width times height of a standing object, from which it is held up, nearer to the camera."""
 HEIGHTS_DIFFER = 0.007
 """m; less can be the error of two heights that are measured in an image."""
 CLOCK_BACK_S = 5.0
@@ -182,7 +182,7 @@ class Recognizer:
                 upright_shape(np.array(outlines.get(name, [])), homography)
                 for outlines in (self._outlines, self._standing)
             )
-            held_up = latest is not None and standing is not None and latest.width > LARGER * standing.width
+            held_up = latest is not None and standing is not None and latest.face > LARGER * standing.face
             return standing if held_up else latest
         return None
 

@@ -39,6 +39,11 @@ class UprightShape:
     height: float
     turn: float | None = None
 
+    @property
+    def face(self) -> float:
+        """Width times height, m²."""
+        return self.width * self.height
+
 
 def upright_shape(outline: Floats, homography: PlaneHomography) -> UprightShape | None:
     """Of a wholly visible object with this outline, [M, 2], px; None if that is not the outline of a solid.
