@@ -162,7 +162,7 @@ def publish_iceoryx2(messages: int, load: Load) -> None:
     for _ in paced(messages, load.period_ns):
         payload = stamped(load.size)
         sample = publisher.loan_slice_uninit(load.size)
-        sample.payload().as_memory_view()[:] = payload
+        ctypes.memmove(sample.payload().as_ptr(), payload, load.size)
         sample.assume_init().send()
     sys.stdin.readline()
 
@@ -179,7 +179,7 @@ def subscribe_iceoryx2(messages: int, load: Load, go: Go) -> list[int]:
         if sample is None:
             time.sleep(1e-4)
         else:
-            arrivals.take(bytes(sample.payload().as_memory_view()))
+            arrivals.take(ctypes.string_at(sample.payload().as_ptr(), load.size))
     return arrivals.latencies
 
 
