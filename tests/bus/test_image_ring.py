@@ -22,6 +22,7 @@ from paramove.bus.image_ring import SLOTS, SMALLEST, OverwrittenError, RingReade
 from paramove.bus.publisher import Publisher
 from paramove.bus.schemas import schema_hash
 from paramove.bus.subscriber import Subscriber
+from paramove.bus.topics import Topic
 from tests.bus.conftest import RawPublisher, Wait
 
 Context = zmq.Context[Any]
@@ -37,7 +38,10 @@ def envelope(sequence: int, epoch: int = 7) -> Envelope:
 
 
 @pytest.fixture
-def pair(context: Context, folder: Path, wait: Wait) -> Iterator[tuple[Publisher, Subscriber]]:
+def pair(
+    context: Context, folder: Path, wait: Wait, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[tuple[Publisher, Subscriber]]:
+    monkeypatch.setattr(Topic, "publisher_high_water_mark", 0)  # the socket drops nothing where the machine is busy
     publisher, subscriber = Publisher(context, folder, TOPIC, "camera"), Subscriber(context, folder, TOPIC)
 
     def welcomed() -> bool:
