@@ -26,7 +26,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -34,17 +33,18 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # run as a prog
 
 import zmq
 
+from benchmarks import bus_soak
 from benchmarks.bus_peers import IMAGES, PEERS, SMALL, Load, describe, installed, paced, stamped
 from benchmarks.bus_soak import VARIANTS, batch, soak, summary_text
-from paramove.bus import Publisher, Subscriber, topics
+from paramove.bus import Publisher, Subscriber
 
-TOPICS = {SMALL: topics.WIRE_HOAP3_STREAM, IMAGES: replace(topics.CAMERA_IMAGE_RAW, rate_hz=30)}
+TOPICS = {SMALL: bus_soak.SMALL, IMAGES: bus_soak.IMAGES}
 
 
 def publish_bus(folder: Path, messages: int, load: Load) -> None:
     """The publisher of the bus: waits for its subscriber, then publishes."""
     context: zmq.Context[Any] = zmq.Context()
-    publisher = Publisher(context, folder, TOPICS[load], "speaker")
+    publisher = Publisher(context, folder, TOPICS[load], "publisher")
     while publisher.subscriptions == 0:
         publisher.socket.poll()
         publisher.serve()

@@ -19,13 +19,14 @@ from typing import Any
 import psutil
 import zmq
 
+from benchmarks import bus_peers
 from benchmarks.bus_peers import PAYLOAD_BYTES, paced
 from paramove.bus import Bus, BusSettings, Received, Subscriber, topics
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 
 SMALL = topics.WIRE_HOAP3_STREAM
 IMAGES = replace(topics.CAMERA_IMAGE_RAW, rate_hz=30)
-IMAGE_BYTES = 1_000_000
+IMAGE_BYTES = bus_peers.IMAGES.size
 IMAGE_EVERY = 33
 """Messages at 1 kHz per image: 30 images a second."""
 ROOT = Path(__file__).resolve().parent.parent

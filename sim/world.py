@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
 from paramove.robots import RobotDescription
@@ -148,16 +147,15 @@ class World:
 
     def place(self, name: str, centre: Floats) -> None:
         """Put an object upright at `centre`, at rest: to set a scene, not part of any story."""
-        half = self._turns[name] / 2 if self.shapes[name].kind == "block" else 0.0
-        self._put(name, centre, (math.cos(half), 0.0, 0.0, math.sin(half)))
+        self._put(name, centre, _about_z(self._turns[name] if self.shapes[name].kind == "block" else 0.0))
 
     def lay(self, name: str) -> None:
         """Lay an object on its side where it stands, turned somehow, at rest."""
-        shape, (x, y, z), half = self.shapes[name], self.position(name), self._turns[name] / 2
-        turn = _multiply(np.array((math.cos(half), 0.0, 0.0, math.sin(half))), np.array((0.5**0.5, 0.5**0.5, 0.0, 0.0)))
+        shape, (x, y, z) = self.shapes[name], self.position(name)
+        turn = _multiply(_about_z(self._turns[name]), np.array((0.5**0.5, 0.5**0.5, 0.0, 0.0)))
         self._put(name, np.array((x, y, z - shape.half_height + shape.half_width)), turn)
 
-    def _put(self, name: str, centre: Floats, quaternion: ArrayLike) -> None:
+    def _put(self, name: str, centre: Floats, quaternion: Floats) -> None:
         joint = self.model.joint(name)
         first = joint.qposadr[0]
         self.data.qpos[first : first + 3] = centre + self.world_from_shoulder
@@ -283,6 +281,10 @@ def _upright_near(turn: Floats) -> Floats:
     cross, cosine = np.cross(axis, goal), float(axis @ goal)
     swing = np.array((1.0 + cosine, *cross))
     return _multiply(swing / np.linalg.norm(swing), turn)
+
+
+def _about_z(angle: float) -> Floats:
+    return np.array((math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)))
 
 
 def _multiply(a: Floats, b: Floats) -> Floats:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from paramove.applications.conversation import GoalClient, Goals, OutgoingMessages
-from paramove.applications.table import Size
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
+from paramove.objects.upright_shape import UprightShape
 
 
 def _sent(client: GoalClient, name: str, attempt: int, state: RelocationStatus.State, height: float = 0.0) -> int:
     """The attempt that a goal has on its way to the arm, which answers with this state."""
     outgoing = OutgoingMessages()
-    client.start(RelocationGoal.KIND_RELOCATE, 0.0, name, attempt=attempt, size=Size(height=height))
+    client.start(RelocationGoal.KIND_RELOCATE, 0.0, name, attempt=attempt, shape=UprightShape(0.0, height))
     client.step(0.0, outgoing)
     (goal,) = outgoing.goals
     client.on_status(RelocationStatus(goal_id=goal.id, state=state))

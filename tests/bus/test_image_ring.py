@@ -65,10 +65,10 @@ def test_the_same_bytes_arrive(pair: tuple[Publisher, Subscriber], wait: Wait) -
     for size in (300_000, 300_004, 120_000, 2_000_000, SMALLEST - 2000, 300_000):
         message = image(publisher.sequence + 1, size)
         publisher.publish(message, 5, publisher.sequence * 66_000_000)
-        heard = wait(subscriber.receive)
-        assert heard.payload == message.SerializeToString(deterministic=True)
-        assert heard.message == message
-        assert heard.sequence == publisher.sequence
+        received = wait(subscriber.receive)
+        assert received.payload == message.SerializeToString(deterministic=True)
+        assert received.message == message
+        assert received.sequence == publisher.sequence
     assert (subscriber.counter.messages, subscriber.counter.lost) == (6, 0)
 
 

@@ -154,7 +154,7 @@ class Applying(Stage):
             target=app.goals.position(app.rules[self._object]),
             avoid=standing.values(),
             attempt=self._attempt,
-            size=app.table.objects[self._object].size,
+            shape=app.table.objects[self._object].shape,
         )
         self.go("relocating")
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from paramove.applications.table import UNKNOWN, Size
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
+from paramove.objects import UprightShape
 
 RESEND_S = 0.5
 QUERY_S = 5.0  # the status of an acknowledged goal is queried after this time without one
@@ -73,7 +73,7 @@ class GoalClient:
         avoid: Iterable[tuple[float, float]] = (),
         attempt: int = 1,
         plan_only: bool = False,
-        size: Size = UNKNOWN,
+        shape: UprightShape | None = None,
     ) -> None:
         """Set a goal; it is sent with the next `step`.
 
@@ -81,7 +81,7 @@ class GoalClient:
         """
         self._count += 1
         if attempt == 1:
-            self._skipped = 0 if size.height else self._worked.get(name, 0)
+            self._skipped = 0 if shape is not None and shape.height else self._worked.get(name, 0)
         goal = RelocationGoal(
             id=f"{self._run_name}-{self._count}",
             kind=kind,
@@ -89,9 +89,11 @@ class GoalClient:
             frame=self._goals.frame,
             attempt=attempt + self._skipped,
         )
-        goal.plan_only, goal.object_width_m, goal.object_height_m = plan_only, size.width, size.height
-        if size.turn is not None:
-            goal.object_turn_rad = size.turn
+        goal.plan_only = plan_only
+        if shape is not None:
+            goal.object_width_m, goal.object_height_m = shape.width, shape.height
+            if shape.turn is not None:
+                goal.object_turn_rad = shape.turn
         if source is not None:
             getattr(goal, "from").CopyFrom(source)
         if target is not None:

@@ -3,22 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from paramove.msgs.gesture_pb2 import Gesture
+from paramove.objects import UprightShape
 
 AT_REST = frozenset({Gesture.KIND_APPEARED, Gesture.KIND_RESTED})
-
-
-class Size(NamedTuple):
-    """Width and height of an upright object, m, 0: not known; angle from x to a side of a square foot, rad."""
-
-    width: float = 0.0
-    height: float = 0.0
-    turn: float | None = None
-
-
-UNKNOWN = Size()
 
 
 @dataclass(frozen=True)
@@ -30,7 +19,7 @@ class Sighting:
         time_s: Capture time.
         u_px, v_px: Image point.
         position: x, y in the plane's frame, m; None while there is no calibration.
-        size: Of the object.
+        shape: Of the object; None: not known.
     """
 
     kind: int
@@ -38,7 +27,7 @@ class Sighting:
     u_px: float
     v_px: float
     position: tuple[float, float] | None
-    size: Size = UNKNOWN
+    shape: UprightShape | None = None
 
     @property
     def at_rest(self) -> bool:
@@ -78,13 +67,12 @@ class Table:
             self.hand_in_view = gesture.kind == Gesture.KIND_HAND_APPEARED
             self.hand_changed_s = time_s
             return
-        turn = gesture.turn_rad if gesture.HasField("turn_rad") else None
-        size = Size(gesture.width_m, gesture.height_m, turn)
+        shape = UprightShape.of(gesture)
         if gesture.kind == Gesture.KIND_POINTED_AT and gesture.object in self.objects:
-            self.objects[gesture.object] = replace(self.objects[gesture.object], size=size)
+            self.objects[gesture.object] = replace(self.objects[gesture.object], shape=shape)
         elif gesture.object and gesture.kind != Gesture.KIND_POINTED_AT:
             position = (gesture.x, gesture.y) if gesture.located else None
-            self.objects[gesture.object] = Sighting(gesture.kind, time_s, gesture.u_px, gesture.v_px, position, size)
+            self.objects[gesture.object] = Sighting(gesture.kind, time_s, gesture.u_px, gesture.v_px, position, shape)
 
     def hand_away_for(self, now_s: float) -> float:
         """How long the hand has been out of view, s; 0 while it is in view."""

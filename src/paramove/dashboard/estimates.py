@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
@@ -12,7 +12,7 @@ from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
-from paramove.objects import HomographyError, PlaneHomography
+from paramove.objects import HomographyError, PlaneHomography, UprightShape
 
 MAX_SPEECH = 12
 MAX_RESULTS = 8
@@ -40,7 +40,7 @@ class _Object:
     state: str = "not detected yet"
     detected: tuple[float, float] | None = None  # m, plane's frame
     put: tuple[float, float] | None = None  # where the robot itself put it down
-    size: dict[str, float | None] | None = None  # width, height, m; turn of a square foot, rad, or None
+    shape: UprightShape | None = None  # as it was last seen
 
 
 class Estimates:
@@ -110,9 +110,7 @@ class Estimates:
             known = self._objects.setdefault(gesture.object, _Object())
             known.state = _GESTURES[gesture.kind]
             known.detected = (gesture.x, gesture.y) if gesture.located else None
-            if gesture.height_m:
-                turn = round(gesture.turn_rad, 3) if gesture.HasField("turn_rad") else None
-                known.size = {"width": round(gesture.width_m, 4), "height": round(gesture.height_m, 4), "turn": turn}
+            known.shape = UprightShape.of(gesture) or known.shape
             if gesture.located and known.state != "gone":
                 known.put = None  # it was detected elsewhere than where the robot put it
 
@@ -171,7 +169,7 @@ class Estimates:
 
     def _object(self, name: str) -> dict[str, Any]:
         known, rule = self._objects[name], self._rules.get(name)
-        at_rest = known.detected if known.state == "stands" and known.size else None  # its height is accounted for
+        at_rest = known.detected if known.state == "stands" and known.shape else None  # its height is accounted for
         position = at_rest or self._detected_now(name) or known.detected or known.put
         state = known.state
         if name == self.held:
@@ -184,7 +182,7 @@ class Estimates:
         return {
             "state": state,
             "place": _position_2d(position),
-            "size": known.size,
+            "size": known.shape and asdict(known.shape),
             "rule": rule and {**rule, "place": _position_2d((rule["x"], rule["y"]))},
         }
 

@@ -7,3 +7,4 @@ from .object_motion import MotionThresholds as MotionThresholds
 from .pointing import PointingThresholds as PointingThresholds
 from .recognizer import Recognizer as Recognizer
 from .recognizer import RecognizerOptions as RecognizerOptions
+from .upright_shape import UprightShape as UprightShape

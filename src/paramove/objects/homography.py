@@ -104,12 +104,18 @@ class PlaneHomography:
         x, y = self.plane_from_image(u_px, v_px)
         if depth == 0.0:
             return x, y
-        directions = self.image_directions(u_px, v_px)
-        _, (largest, smallest), axes = np.linalg.svd(directions)
-        away = -np.sign((directions @ axes[1])[1]) * axes[1]  # foreshortened most; up in the image
-        sine = smallest / largest  # of the camera's elevation, as a small circle is seen as an ellipse
+        away, sine = self.away_from_camera(u_px, v_px)
         farther = depth * np.sqrt(1.0 - sine**2) / sine
         return float(x + farther * away[0]), float(y + farther * away[1])
+
+    def away_from_camera(self, u_px: float, v_px: float) -> tuple[Floats, float]:
+        """The direction in the plane, [2], that leads away from the camera near (u, v), and the sine of its elevation.
+
+        A small circle is seen as an ellipse: foreshortened most along that direction, which leads up in the image.
+        """
+        directions = self.image_directions(u_px, v_px)
+        _, (largest, smallest), axes = np.linalg.svd(directions)
+        return -np.sign((directions @ axes[1])[1]) * axes[1], float(smallest / largest)
 
     def image_from_plane(self, x: float, y: float) -> tuple[float, float]:
         """(u, v), px. Raises ValueError for a point without a finite image."""

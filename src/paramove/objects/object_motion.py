@@ -116,11 +116,14 @@ class ObjectMotion:
 
     def is_best_view(self, sample: Sample) -> bool:
         """Whether nothing hides it in this sample, less than ever since it came to rest, or has stood."""
-        stands = self.state is State.RESTING and sample.time_s - self._rests_since_s >= self._limits.stands_s
-        if self.state is not State.RESTING or stands != self.stands:
+        if self.state is not State.RESTING:
+            self.stands, self._best_visible = False, 0.0
+            return False
+        stands = sample.time_s - self._rests_since_s >= self._limits.stands_s
+        if stands != self.stands:
             self.stands, self._best_visible = stands, 0.0
         visible = self.visible_fraction(sample)
-        if self.state is not State.RESTING or visible < max(self._limits.clear_share, self._best_visible):
+        if visible < max(self._limits.clear_share, self._best_visible):
             return False
         self._best_visible = visible
         return True

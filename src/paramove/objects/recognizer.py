@@ -75,10 +75,10 @@ class Recognizer:
                 motion.blind = True
         self._watched_s += min(step_s, LONGEST_STEP_S)
         now_s = self._watched_s
+        homography = self._homography(calibration)
         if not all(_in_some_image(one) for one in tracked.objects):
             usable = [one for one in tracked.objects if _in_some_image(one)]
             tracked = TrackedObjects(captured=tracked.captured, objects=usable)
-        homography = self._homography(calibration)
         self._openings.update(tracked.openings)
         hand = next((one for one in tracked.objects if one.kind == TrackedObject.KIND_HAND), None)
         gestures: list[Gesture] = []

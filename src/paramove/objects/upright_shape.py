@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from paramove.documents import Floats
+from paramove.msgs.gesture_pb2 import Gesture
 from paramove.objects.homography import PlaneHomography
 
 _DIRECTIONS = np.deg2rad(np.arange(0.0, 180.0, 7.5))
@@ -30,14 +32,20 @@ MAX_SINE = 0.98
 @dataclass(frozen=True)
 class UprightShape:
     """Attributes:
-    width: Diameter of a round foot, side of a square one, m.
-    height: m.
+    width: Diameter of a round foot, side of a square one, m; 0: not known.
+    height: m; 0: not known.
     turn: Of a square foot: from x to one of its sides, 0 to π/2, rad, frame of the plane; None: it is round.
     """
 
     width: float
     height: float
     turn: float | None = None
+
+    @classmethod
+    def of(cls, gesture: Gesture) -> Self | None:
+        """Of the gesture's object; None: not known."""
+        turn = gesture.turn_rad if gesture.HasField("turn_rad") else None
+        return cls(gesture.width_m, gesture.height_m, turn) if gesture.width_m or gesture.height_m else None
 
     @property
     def face(self) -> float:
@@ -57,12 +65,11 @@ def upright_shape(outline: Floats, homography: PlaneHomography) -> UprightShape 
         return None
     u, v = (float(middle) for middle in (outline.min(axis=0) + outline.max(axis=0)) / 2)
     image_from_plane = homography.image_directions(u, v)
-    _, (largest, smallest), directions = np.linalg.svd(image_from_plane)
-    up = image_from_plane @ directions[1] / smallest
-    cosine = math.sqrt(1.0 - min(smallest / largest, MAX_SINE) ** 2)
+    away, sine = homography.away_from_camera(u, v)
+    up = image_from_plane @ away * math.sqrt(1.0 - min(sine, MAX_SINE) ** 2) / sine
     along = outline @ _ACROSS.T
     widths = along.max(axis=0) - along.min(axis=0) + _PIXEL
-    of_height = cosine * largest * np.abs(_ACROSS @ up)
+    of_height = np.abs(_ACROSS @ up)
     in_plane = _ACROSS @ image_from_plane
     feet = [np.linalg.norm(in_plane, axis=1)]
     for turn in _TURNS:
