@@ -82,7 +82,7 @@ class Measures:
                 f"{CYLINDER_RADIUS} m, and with the chamfer below {widest} m, expected"
             )
         if not all(0 < height < COMPARTMENT_DEPTH for height in _of_each(self.object_height)):
-            raise ValueError(f"objects of height {self.object_height} m: less than {COMPARTMENT_DEPTH} m expected")
+            raise ValueError(f"objects of height {self.object_height} m: less than {COMPARTMENT_DEPTH:g} m expected")
 
     def shapes(self, usual_width: float) -> dict[str, Shape]:
         """Of the objects, by their colours."""
