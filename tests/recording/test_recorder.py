@@ -116,7 +116,8 @@ def test_a_full_disk_is_waited_for_and_the_recording_goes_on_in_a_further_part(d
         for _ in range(50):  # more than may wait
             recording.keep(speech(next(numbers), 1000))
         filler.unlink()
-        say_until(lambda: path.with_name("run.2.mcap.part").exists(), "it goes on")
+        further = path.with_name("run.2.mcap.part")
+        until(lambda: further.exists() and len(numbers_in(further)) > 10, "it goes on with what waits")
         say_until(lambda: "less than 1 GB" in bus.states[-1][1], "it says so")
     parts = PartedRecording(path)
     assert [part.name for part in parts.parts] == ["run.mcap", "run.2.mcap"]  # both are finished

@@ -10,6 +10,7 @@ from paramove.cameras.camera_socket import CameraSocket, short_name
 from paramove.cameras.frame_sources import SourceError, open_source
 from sim.camera import raw_image
 from sim.offered_camera import OfferedCamera
+from tests.supervision.conftest import until
 
 LONG = "a_folder_whose_name_is_far_too_long_for_the_path_of_a_socket" * 2
 
@@ -53,13 +54,16 @@ def test_the_latest_who_came_gets_every_image_from_then_on(offered, tmp_path):
 
 def test_a_device_that_is_a_socket_gives_frames(offered, tmp_path):
     source = open_source("device:camera", 6, 4, tmp_path / LONG)
-    frame, now_ns = None, 0
-    while frame is None and now_ns < 900:
-        list(offered.images(None, 1, now_ns))
-        frame, now_ns = source.frame(now_ns), now_ns + 1
+    frames = []
+
+    def received() -> bool:
+        list(offered.images(None, 1, 1))
+        frames.append(source.frame(1))
+        return frames[-1] is not None
+
+    until(received, "a frame")
     source.close()
-    assert frame is not None
-    assert frame.image_bgr.shape == (4, 6, 3)
+    assert frames[-1].image_bgr.shape == (4, 6, 3)
 
 
 def test_the_end_of_the_other_program_is_the_end_of_the_images(offered, tmp_path):
