@@ -255,11 +255,13 @@ class Instructor(Person):
     # -- what to take next --------------------------------------------------------------------------------------------
 
     def _to_hand_over(self) -> str:
-        """A cylinder on the box if there is one, else a parked one."""
+        """An object on the box if there is one, else a parked one; one that does not lie, if there is one."""
         on_box = [colour for colour in tool_box.COLOURS if self._sees.stands(colour)]
         candidates = (
             on_box or [colour for colour in tool_box.COLOURS if self._sees.is_parked(colour)] or tool_box.COLOURS
         )
+        upright = [colour for colour in candidates if self.table.shapes[colour].kind != "lying"]
+        candidates = upright or candidates
         return candidates[int(self._order.integers(len(candidates)))]
 
     def _next_to_point(self, requested: str) -> str | None:

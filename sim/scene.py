@@ -24,6 +24,7 @@ HOAP3 = Workspace.here().find("robot_description/hoap3")
 SOLREF = (0.002, 1.0)  # stiff: nothing sinks in by more than 0.7 mm
 SOLIMP = (0.99, 0.999, 0.0003, 0.5, 2.0)
 TABLE_FRICTION = (0.25, 0.0005, 0.0001)
+ROLLING = 0.0005  # m; of wood on wood, where anything may roll
 OBJECT_FRICTION = (0.3, 0.005, 0.0001)
 HOLD_SOLREF = (0.02, 1.0)  # the instructor's fingers give about 1 mm per newton
 
@@ -74,12 +75,22 @@ def build(
     _add_lights(spec, world_looks.brightness)
     _add_surroundings(spec, world_from_shoulder, mount.table_edge)
     _add_box(spec, world_from_shoulder, world_looks.measures)
-    _add_objects(spec, world_from_shoulder, world_looks.measures.shapes(mount.object_width))
+    shapes = world_looks.measures.shapes(mount.object_width)
+    _add_objects(spec, world_from_shoulder, shapes)
     _add_hand(spec, world_from_shoulder)
     _add_cameras(spec, world_looks, world_from_shoulder)
     for furnish in furnishings:
         furnish(spec, world_from_shoulder)
-    return spec.compile(), mount
+    model = spec.compile()
+    if any(shape.kind == "lying" for shape in shapes.values()):
+        slow_rolling(model)
+    return model, mount
+
+
+def slow_rolling(model: mujoco.MjModel) -> None:
+    """Surfaces, which have a priority, slow down what rolls on them."""
+    surfaces = model.geom_priority == touchable()["priority"]
+    model.geom_condim[surfaces], model.geom_friction[surfaces, 2] = 6, ROLLING
 
 
 def _set_options(spec: mujoco.MjSpec) -> None:
@@ -255,8 +266,11 @@ def _add_surface(
 def _add_objects(spec: mujoco.MjSpec, world_from_shoulder: Floats, shapes: Mapping[str, tool_box.Shape]) -> None:
     for (colour, shape), place in zip(shapes.items(), places.PARKED, strict=True):
         kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, (shape.half_width, shape.half_height, 0.0)
+        turn = (1.0, 0.0, 0.0, 0.0)
         if shape.kind == "block":
             kind, size = mujoco.mjtGeom.mjGEOM_BOX, (shape.half_width, shape.half_width, shape.half_height)
+        elif shape.kind == "lying":
+            size, turn = (shape.half_height, shape.half_width, 0.0), (0.5**0.5, 0.0, 0.5**0.5, 0.0)
         wider = shape.half_width / tool_box.CYLINDER_RADIUS
         taller = shape.half_height / tool_box.CYLINDER_HALF_HEIGHT
         body = spec.worldbody.add_body(name=colour, pos=world_from_shoulder + place)
@@ -265,6 +279,7 @@ def _add_objects(spec: mujoco.MjSpec, world_from_shoulder: Floats, shapes: Mappi
             name=colour,
             type=kind,
             size=size,
+            quat=turn,
             mass=tool_box.CYLINDER_MASS * wider**2 * taller,
             rgba=RGBA[colour],
             friction=OBJECT_FRICTION,

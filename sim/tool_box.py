@@ -42,7 +42,7 @@ CENTRE = (sum(X_RANGE) / 2, sum(Y_RANGE) / 2, SURFACE_Z - THICKNESS / 2)
 
 
 T = TypeVar("T")
-ShapeKind = Literal["cylinder", "block"]
+ShapeKind = Literal["cylinder", "block", "lying"]
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,8 @@ class Measures:
         chamfer: Height and width of the openings' chamfer, m.
         object_width: Of the objects, or of each in the order of `COLOURS`, m; None: as it suits the robot's gripper.
         object_height: Of all or each of them, m; less than a compartment is deep.
-        object_shape: Of all or each of them. A block has a square foot: it is a cube if it is as high as wide.
+        object_shape: Of all or each of them. A block has a square foot: it is a cube if it is as high as wide. A
+            cylinder that lies, and is put down lying, is as long as its width and as thick as its height.
     """
 
     camera_elevation_deg: float = 52.0

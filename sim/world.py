@@ -147,10 +147,11 @@ class World:
 
     def place(self, name: str, centre: Floats) -> None:
         """Put an object upright at `centre`, at rest: to set a scene, not part of any story."""
-        self._put(name, centre, _about_z(self._turns[name] if self.shapes[name].kind == "block" else 0.0))
+        self._put(name, centre, _about_z(0.0 if self.shapes[name].kind == "cylinder" else self._turns[name]))
 
     def lay(self, name: str) -> None:
         """Lay an object on its side where it stands, turned somehow, at rest."""
+        scene.slow_rolling(self.model)
         shape, (x, y, z) = self.shapes[name], self.position(name)
         turn = _multiply(_about_z(self._turns[name]), np.array((0.5**0.5, 0.5**0.5, 0.0, 0.0)))
         self._put(name, np.array((x, y, z - shape.half_height + shape.half_width)), turn)

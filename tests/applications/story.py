@@ -42,6 +42,7 @@ class Story:
         in_the_way: Of the next refusals: places in the goal's `avoid`.
         misfit: Whether what is refused is of an unfit size.
         twins: Colours of which there are two objects.
+        lie: Colours of the objects that lie.
         deaf: How many goals the arm does not hear.
         answers: Request -> what the instructor does then.
     """
@@ -60,6 +61,7 @@ class Story:
         self.in_the_way: list[list[int]] = []
         self.misfit = False
         self.twins: set[str] = set()
+        self.lie: set[str] = set()
         self.deaf = 0
         self.places: dict[str, Place] = {}
         self.calibrated = False
@@ -123,6 +125,7 @@ class Story:
         if self.calibrated:
             seen.x, seen.y, seen.frame = place[0], place[1], "right_shoulder"
             seen.width_m = WIDTH if name else 0.0
+            seen.length_m = 2 * WIDTH if name in self.lie else 0.0
         seen.twin = name in self.twins
         seen.captured.FromNanoseconds(self.now_ns)
         self._heard(topics.GESTURES, seen)

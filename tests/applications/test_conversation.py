@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from paramove.applications.conversation import GoalClient, Goals, OutgoingMessages
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
-from paramove.objects.upright_shape import UprightShape
+from paramove.objects.object_shape import ObjectShape
 
 
 def _sent(client: GoalClient, name: str, attempt: int, state: RelocationStatus.State, height: float = 0.0) -> int:
     """The attempt that a goal has on its way to the arm, which answers with this state."""
     outgoing = OutgoingMessages()
-    client.start(RelocationGoal.KIND_RELOCATE, 0.0, name, attempt=attempt, shape=UprightShape(0.0, height))
+    client.start(RelocationGoal.KIND_RELOCATE, 0.0, name, attempt=attempt, shape=ObjectShape(0.0, height))
     client.step(0.0, outgoing)
     (goal,) = outgoing.goals
     client.on_status(RelocationStatus(goal_id=goal.id, state=state))

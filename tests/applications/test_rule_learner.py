@@ -364,6 +364,27 @@ def test_another_one_is_asked_for_in_place_of_an_object_of_unfit_size() -> None:
     assert f"{reason}. Please stand another one there." in story.sentences()
 
 
+def test_one_that_has_fallen_over_is_stood_up_before_the_arm_moves() -> None:
+    story = Story()
+    story.run_to(APPLY)
+    story.lie = {"yellow"}
+    assert story.run(until=lambda: "yellow has fallen over. Please stand it up." in story.sentences())
+    assert "yellow" not in [goal.object for goal in story.relocations()]
+    story.lie = set()
+    assert story.run(), story.learner.detail
+
+
+@pytest.mark.parametrize("begins", ["shown", "left"])
+def test_one_that_shall_lie_is_taken_as_it_lies(begins: str) -> None:
+    story = Story()
+    if begins == "left":
+        story.run_to(APPLY)
+    story.lie = {"yellow"}
+    assert story.run(), story.learner.detail
+    assert [goal.object_length_m > 0 for goal in story.relocations() if goal.object == "yellow"] == [True]
+    assert story.sentences().count("yellow has fallen over") == (begins == "left")
+
+
 def test_what_a_person_puts_in_is_put_away() -> None:
     story = Story()
     story.answers[Speech.REQUEST_POINT_AT_OBJECT] = lambda _: None

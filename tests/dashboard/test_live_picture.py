@@ -86,8 +86,8 @@ def test_objects_are_drawn_as_they_were_seen() -> None:
     gone = Gesture(kind=Gesture.KIND_VANISHED, object="blue")
     unknown = Gesture(kind=Gesture.KIND_RESTED, object="yellow")
     found = sections(*((topics.GESTURES, one) for one in (block, round_one, gone, unknown)))["objects"]
-    assert found["green"]["size"] == {"width": 0.028, "height": 0.0275, "turn": 0.4}
-    assert found["blue"]["size"] == {"width": 0.022, "height": 0.05, "turn": None}
+    assert found["green"]["size"] == {"width": 0.028, "height": 0.0275, "turn": 0.4, "length": 0.0}
+    assert found["blue"]["size"] == {"width": 0.022, "height": 0.05, "turn": None, "length": 0.0}
     assert found["yellow"]["size"] is None
 
 

@@ -213,12 +213,25 @@ def test_a_hand_with_roll_is_turned_along_the_sides_of_a_block(turn_deg: float, 
     np.testing.assert_allclose(oracle.object_in(row, 0.0), far, rtol=0, atol=2e-4)
 
 
+@pytest.mark.parametrize("turn_deg", [-85.0, -30.0, 20.0, 80.0])
+def test_a_hand_with_roll_closes_across_what_lies(turn_deg: float) -> None:
+    plan, oracle, source = reaching("koch_v1_1"), Oracle("koch_v1_1"), np.array((0.15, 0.05, 0.036))
+    fetch = plan.fetch(source, grasp=Grasp(None, 1, 0.020, 0.020, np.deg2rad(turn_deg), 0.030))
+    oracle.object_in(fetch.angles[round(dict(fetch.phases)["grasp"] / 0.01)], FINGER_GAP_M)
+    side = oracle.scene.data.site(oracle.chain.sites.end_effector).xmat.reshape(3, 3)[:, 1]
+    off_deg = np.rad2deg(np.arctan2(side[1], side[0])) - turn_deg
+    assert abs(np.remainder(off_deg, 180) - 90) < 3.0
+    assert_playable("koch_v1_1", fetch)
+
+
 def test_an_arm_without_roll_takes_a_block_that_fits_between_its_fingers_as_it_stands() -> None:
     plan, source = reaching("open_manipulator_x"), np.array((0.15, 0.0, 0.036))
     for width, turn_deg in ((0.030, 45.0), (0.045, 0.0)):
         plan.fetch(source, grasp=Grasp(width=width, turn=np.deg2rad(turn_deg)))
     with pytest.raises(NoPlanError, match="64 mm wide"):
         plan.fetch(source, grasp=Grasp(width=0.045, turn=np.deg2rad(45.0)))
+    with pytest.raises(NoPlanError, match="60 mm wide"):
+        plan.fetch(source, grasp=Grasp(width=0.030, turn=np.deg2rad(90.0), length=0.060))
 
 
 @each_arm

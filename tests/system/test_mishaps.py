@@ -12,7 +12,7 @@ SAID = {
     "two_of_one_colour": "I see more than one",
     "too_wide": "mm wide as it stands; this gripper holds",
     "too_tall": "mm high; the arm moves objects of 50 mm",
-    "fallen": "Please",
+    "fallen": "has fallen over. Please stand it up",
     "covered_opening": "Please uncover the opening",
     "moved_camera": "Was the camera moved, or my base? I calibrate again",
     "moved_base": "Was the camera moved, or my base? I calibrate again",

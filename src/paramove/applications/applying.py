@@ -141,9 +141,13 @@ class Applying(Stage):
             self._relocate()
 
     def _relocate(self) -> None:
+        app, shape = self.app, self.app.table.objects[self._object].shape
+        if shape is not None and shape.length and self._object not in app.lay:
+            app.lay.add(self._object)  # asked once: where it still lies, it is to be taken as it lies
+            self._ask_for_help(f"{self._object} has fallen over.", please="Please stand it up")
+            return
         self._attempt += 1
-        self._began_s, self._failure = self.app.now_s, ""
-        app = self.app
+        self._began_s, self._failure = app.now_s, ""
         standing = app.table.standing(but=self._object)
         self._avoided = tuple(standing)
         app.goal_client.start(
@@ -154,7 +158,7 @@ class Applying(Stage):
             target=app.goals.position(app.rules[self._object]),
             avoid=standing.values(),
             attempt=self._attempt,
-            shape=app.table.objects[self._object].shape,
+            shape=shape,
         )
         self.go("relocating")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
-from paramove.objects import UprightShape
+from paramove.objects import ObjectShape
 
 RESEND_S = 0.5
 QUERY_S = 5.0  # the status of an acknowledged goal is queried after this time without one
@@ -73,7 +73,7 @@ class GoalClient:
         avoid: Iterable[tuple[float, float]] = (),
         attempt: int = 1,
         plan_only: bool = False,
-        shape: UprightShape | None = None,
+        shape: ObjectShape | None = None,
     ) -> None:
         """Set a goal; it is sent with the next `step`.
 
@@ -91,7 +91,7 @@ class GoalClient:
         )
         goal.plan_only = plan_only
         if shape is not None:
-            goal.object_width_m, goal.object_height_m = shape.width, shape.height
+            goal.object_width_m, goal.object_height_m, goal.object_length_m = shape.width, shape.height, shape.length
             if shape.turn is not None:
                 goal.object_turn_rad = shape.turn
         if source is not None:

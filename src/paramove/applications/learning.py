@@ -39,6 +39,7 @@ class Learning(Stage):
         if gesture.kind == Gesture.KIND_MOVED:
             self._moved.add(name)
             self._going_in.pop(name, None)
+            (self.app.lay.add if gesture.length_m else self.app.lay.discard)(name)
         elif gesture.kind in (Gesture.KIND_APPEARED, Gesture.KIND_RESTED):
             self._going_in.pop(name, None)
             self._moved.discard(name)

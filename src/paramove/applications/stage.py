@@ -25,6 +25,7 @@ class ApplicationState:
     Attributes:
         begun_s: When the run began, by the same clock as all times.
         rules: Object -> position of its opening.
+        lay: Objects that a person wants to lie: they lay when their rules were shown, or still do when asked about it.
         done: Objects that have been put away.
     """
 
@@ -36,6 +37,7 @@ class ApplicationState:
     outgoing: OutgoingMessages = field(default_factory=OutgoingMessages)
     now_s: float = 0.0
     rules: dict[str, Place] = field(default_factory=dict)
+    lay: set[str] = field(default_factory=set)
     done: set[str] = field(default_factory=set)
     detail: str = ""
 

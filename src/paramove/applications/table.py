@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from paramove.msgs.gesture_pb2 import Gesture
-from paramove.objects import UprightShape
+from paramove.objects import ObjectShape
 
 AT_REST = frozenset({Gesture.KIND_APPEARED, Gesture.KIND_RESTED})
 
@@ -27,7 +27,7 @@ class Sighting:
     u_px: float
     v_px: float
     position: tuple[float, float] | None
-    shape: UprightShape | None = None
+    shape: ObjectShape | None = None
 
     @property
     def at_rest(self) -> bool:
@@ -67,7 +67,7 @@ class Table:
             self.hand_in_view = gesture.kind == Gesture.KIND_HAND_APPEARED
             self.hand_changed_s = time_s
             return
-        shape = UprightShape.of(gesture)
+        shape = ObjectShape.of(gesture)
         if gesture.kind == Gesture.KIND_POINTED_AT and gesture.object in self.objects:
             self.objects[gesture.object] = replace(self.objects[gesture.object], shape=shape)
         elif gesture.object and gesture.kind != Gesture.KIND_POINTED_AT:

@@ -12,7 +12,7 @@ from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
-from paramove.objects import HomographyError, PlaneHomography, UprightShape
+from paramove.objects import HomographyError, ObjectShape, PlaneHomography
 
 MAX_SPEECH = 12
 MAX_RESULTS = 8
@@ -40,7 +40,7 @@ class _Object:
     state: str = "not detected yet"
     detected: tuple[float, float] | None = None  # m, plane's frame
     put: tuple[float, float] | None = None  # where the robot itself put it down
-    shape: UprightShape | None = None  # as it was last seen
+    shape: ObjectShape | None = None  # as it was last seen
 
 
 class Estimates:
@@ -110,7 +110,7 @@ class Estimates:
             known = self._objects.setdefault(gesture.object, _Object())
             known.state = _GESTURES[gesture.kind]
             known.detected = (gesture.x, gesture.y) if gesture.located else None
-            known.shape = UprightShape.of(gesture) or known.shape
+            known.shape = ObjectShape.of(gesture) or known.shape
             if gesture.located and known.state != "gone":
                 known.put = None  # it was detected elsewhere than where the robot put it
 

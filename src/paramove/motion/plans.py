@@ -44,7 +44,9 @@ class Grasp:
         target: Where the object is to be delivered, [3], m; None: not known yet.
         attempt: From 1; every second one is made in another way.
         width, height: Of the object, m; None: as objects usually are.
-        turn: Of its square foot: from x to one of its sides, rad; None: it is round, or that is not known.
+        turn: From x to one of the sides of its square foot, or to its length, rad; None: it is round, or that is not
+            known.
+        length: Of an object that lies, m; None: it stands.
     """
 
     target: Floats | None = None
@@ -52,6 +54,7 @@ class Grasp:
     width: float | None = None
     height: float | None = None
     turn: float | None = None
+    length: float | None = None
 
     def check_height(self, usual: float) -> None:
         """Raises MisfitError for an object that is taller than those, m, that motions are planned for."""

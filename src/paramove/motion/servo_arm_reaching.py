@@ -130,12 +130,12 @@ class ServoArmReaching:
         Where the target is known, it is grasped with a pitch that reaches that, too, so that it will stand upright.
         Every second attempt is made with another pitch and a wider gripper; the widest objects need that, too. A low
         object is grasped below its top, one of unknown height low in every second attempt. An arm with a roll turns its
-        fingers along the sides of a square foot.
+        fingers along the sides of a square foot, or along the length of an object that lies.
         """
         grasp.check_height(self._clearance.cylinder.height)
-        askew, lowered = self._askew(source, grasp.turn), self._lowered(source, grasp)
+        askew, lowered = self._askew(source, grasp), self._lowered(source, grasp)
         turned = askew if self._arm.n_joints == 5 else 0.0
-        width = self._held_width(grasp.width, askew - turned)
+        width = self._held_width(grasp, askew - turned)
         point = self._beside(source, width, FINGER_GAP_M, turned) - lowered * _UP
         target = None if grasp.target is None else self._beside(grasp.target, width) - lowered * _UP
         pitch = self._pitch_of_both(point, target)
@@ -403,16 +403,17 @@ class ServoArmReaching:
             preferred = self._grasp_pitch(axis + self._usual_reach * ahead, preferred)
         return self._grasp_pitch(source, preferred)
 
-    def _held_width(self, width: float | None, askew: float) -> float:
+    def _held_width(self, grasp: Grasp, askew: float) -> float:
         """A width that the gripper holds, m, as measured ones are not exact; raises MisfitError.
 
         Args:
-            askew: Angle between fingers and sides of a square foot, rad: it must fit between them before it turns.
+            askew: Angle between fingers and sides of the object, rad: it must fit between them before it turns.
         """
         narrowest, widest = self._widths
+        width = grasp.width
         if width is None:
             return self._usual_width
-        across = width * (np.cos(askew) + abs(np.sin(askew)))
+        across = width * np.cos(askew) + (grasp.length or width) * abs(np.sin(askew))
         if not narrowest - WIDTH_ERROR_M <= width <= across <= widest + WIDTH_ERROR_M:
             raise MisfitError(
                 f"the object looks {1000 * across:.0f} mm wide as it stands; this gripper holds objects of "
@@ -427,12 +428,13 @@ class ServoArmReaching:
             return max(0.0, height - max(o.low_grasp, o.grasp_share * grasp.height))
         return max(0.0, height - o.low_grasp) if grasp.attempt % 2 == 0 else 0.0
 
-    def _askew(self, source: ArrayLike, turn: float | None) -> float:
-        """Angle, rad, up to π/4, from the fingers of the hand without roll to the sides of a square foot."""
-        if turn is None:
+    def _askew(self, source: ArrayLike, grasp: Grasp) -> float:
+        """Angle, rad, from the fingers of the hand without roll to the object's length, or the nearest of its sides."""
+        if grasp.turn is None:
             return 0.0
         x, y = np.asarray(source, dtype=np.float64)[:2] - self._arm.yaw_axis
-        return float(np.remainder(turn - np.arctan2(y, x) + np.pi / 4, np.pi / 2) - np.pi / 4)
+        alike = np.pi / 2 if grasp.length is None else np.pi
+        return float(np.remainder(grasp.turn - np.arctan2(y, x) + alike / 2, alike) - alike / 2)
 
     def _beside(self, position: ArrayLike, width: float, gap: float = 0.0, turned: float = 0.0) -> Floats:
         """The end effector when an object at `position` is so far from the face of a finger that does not move.

@@ -207,7 +207,8 @@ class Synthesizer:
     def _fetch(self, goal: RelocationGoal, then: Callable[[RestPose, Floats, Floats], PlannedMotion]) -> _Course:
         source, target, standing = point_of(goal, "from"), point_of(goal, "to"), standing_of(goal)
         known = target if goal.kind == RelocationGoal.KIND_RELOCATE else None
-        grasp = Grasp(known, goal.attempt, size_of(goal, "width"), size_of(goal, "height"), turn_of(goal))
+        width, height, length = (size_of(goal, name) for name in ("width", "height", "length"))
+        grasp = Grasp(known, goal.attempt, width, height, turn_of(goal), length)
         fetch = self._plans.fetch(source, standing, self._start_of(goal), grasp)
         onwards = then(fetch.end, target, standing)  # known to be possible before the arm moves
         yield fetch

@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1bparamove/msgs/gesture.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xd8\x03\n\x07Gesture\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12)\n\x04kind\x18\x02 \x01(\x0e\x32\x1b.paramove.msgs.Gesture.Kind\x12\x0e\n\x06object\x18\x03 \x01(\t\x12\x0c\n\x04u_px\x18\x04 \x01(\x01\x12\x0c\n\x04v_px\x18\x05 \x01(\x01\x12\x0f\n\x07located\x18\x06 \x01(\x08\x12\r\n\x05\x66rame\x18\x07 \x01(\t\x12\t\n\x01x\x18\x08 \x01(\x01\x12\t\n\x01y\x18\t \x01(\x01\x12\x12\n\nconfidence\x18\n \x01(\x01\x12\x0f\n\x07width_m\x18\x0b \x01(\x01\x12\x10\n\x08height_m\x18\x0c \x01(\x01\x12\x0c\n\x04twin\x18\r \x01(\x08\x12\x15\n\x08turn_rad\x18\x0e \x01(\x01H\x00\x88\x01\x01\"\xa8\x01\n\x04Kind\x12\x14\n\x10KIND_UNSPECIFIED\x10\x00\x12\x11\n\rKIND_APPEARED\x10\x01\x12\x0e\n\nKIND_MOVED\x10\x02\x12\x0f\n\x0bKIND_RESTED\x10\x03\x12\x11\n\rKIND_VANISHED\x10\x04\x12\x13\n\x0fKIND_POINTED_AT\x10\x05\x12\x16\n\x12KIND_HAND_APPEARED\x10\x06\x12\x16\n\x12KIND_HAND_VANISHED\x10\x07\x42\x0b\n\t_turn_radb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1bparamove/msgs/gesture.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xea\x03\n\x07Gesture\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12)\n\x04kind\x18\x02 \x01(\x0e\x32\x1b.paramove.msgs.Gesture.Kind\x12\x0e\n\x06object\x18\x03 \x01(\t\x12\x0c\n\x04u_px\x18\x04 \x01(\x01\x12\x0c\n\x04v_px\x18\x05 \x01(\x01\x12\x0f\n\x07located\x18\x06 \x01(\x08\x12\r\n\x05\x66rame\x18\x07 \x01(\t\x12\t\n\x01x\x18\x08 \x01(\x01\x12\t\n\x01y\x18\t \x01(\x01\x12\x12\n\nconfidence\x18\n \x01(\x01\x12\x0f\n\x07width_m\x18\x0b \x01(\x01\x12\x10\n\x08height_m\x18\x0c \x01(\x01\x12\x0c\n\x04twin\x18\r \x01(\x08\x12\x15\n\x08turn_rad\x18\x0e \x01(\x01H\x00\x88\x01\x01\x12\x10\n\x08length_m\x18\x0f \x01(\x01\"\xa8\x01\n\x04Kind\x12\x14\n\x10KIND_UNSPECIFIED\x10\x00\x12\x11\n\rKIND_APPEARED\x10\x01\x12\x0e\n\nKIND_MOVED\x10\x02\x12\x0f\n\x0bKIND_RESTED\x10\x03\x12\x11\n\rKIND_VANISHED\x10\x04\x12\x13\n\x0fKIND_POINTED_AT\x10\x05\x12\x16\n\x12KIND_HAND_APPEARED\x10\x06\x12\x16\n\x12KIND_HAND_VANISHED\x10\x07\x42\x0b\n\t_turn_radb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -33,7 +33,7 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'paramove.msgs.gesture_pb2',
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_GESTURE']._serialized_start=80
-  _globals['_GESTURE']._serialized_end=552
-  _globals['_GESTURE_KIND']._serialized_start=371
-  _globals['_GESTURE_KIND']._serialized_end=539
+  _globals['_GESTURE']._serialized_end=570
+  _globals['_GESTURE_KIND']._serialized_start=389
+  _globals['_GESTURE_KIND']._serialized_end=557
 # @@protoc_insertion_point(module_scope)

@@ -7,7 +7,7 @@ from typing import ClassVar as _ClassVar, Mapping as _Mapping, Optional as _Opti
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class Gesture(_message.Message):
-    __slots__ = ("captured", "kind", "object", "u_px", "v_px", "located", "frame", "x", "y", "confidence", "width_m", "height_m", "twin", "turn_rad")
+    __slots__ = ("captured", "kind", "object", "u_px", "v_px", "located", "frame", "x", "y", "confidence", "width_m", "height_m", "twin", "turn_rad", "length_m")
     class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         KIND_UNSPECIFIED: _ClassVar[Gesture.Kind]
@@ -40,6 +40,7 @@ class Gesture(_message.Message):
     HEIGHT_M_FIELD_NUMBER: _ClassVar[int]
     TWIN_FIELD_NUMBER: _ClassVar[int]
     TURN_RAD_FIELD_NUMBER: _ClassVar[int]
+    LENGTH_M_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     kind: Gesture.Kind
     object: str
@@ -54,4 +55,5 @@ class Gesture(_message.Message):
     height_m: float
     twin: bool
     turn_rad: float
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., kind: _Optional[_Union[Gesture.Kind, str]] = ..., object: _Optional[str] = ..., u_px: _Optional[float] = ..., v_px: _Optional[float] = ..., located: bool = ..., frame: _Optional[str] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., confidence: _Optional[float] = ..., width_m: _Optional[float] = ..., height_m: _Optional[float] = ..., twin: bool = ..., turn_rad: _Optional[float] = ...) -> None: ...
+    length_m: float
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., kind: _Optional[_Union[Gesture.Kind, str]] = ..., object: _Optional[str] = ..., u_px: _Optional[float] = ..., v_px: _Optional[float] = ..., located: bool = ..., frame: _Optional[str] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., confidence: _Optional[float] = ..., width_m: _Optional[float] = ..., height_m: _Optional[float] = ..., twin: bool = ..., turn_rad: _Optional[float] = ..., length_m: _Optional[float] = ...) -> None: ...

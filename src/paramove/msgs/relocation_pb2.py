@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1eparamove/msgs/relocation.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\x99\x04\n\x0eRelocationGoal\x12\n\n\x02id\x18\x01 \x01(\t\x12\x30\n\x04kind\x18\x02 \x01(\x0e\x32\".paramove.msgs.RelocationGoal.Kind\x12\x0e\n\x06object\x18\x03 \x01(\t\x12\r\n\x05\x66rame\x18\x04 \x01(\t\x12%\n\x04\x66rom\x18\x05 \x01(\x0b\x32\x17.paramove.msgs.Position\x12#\n\x02to\x18\x06 \x01(\x0b\x32\x17.paramove.msgs.Position\x12\x0f\n\x07\x61ttempt\x18\x07 \x01(\r\x12&\n\x05\x61void\x18\x08 \x03(\x0b\x32\x17.paramove.msgs.Position\x12\x13\n\x0b\x61sked_again\x18\t \x01(\x08\x12\x16\n\x0eobject_width_m\x18\x0b \x01(\x01\x12\x17\n\x0fobject_height_m\x18\x0c \x01(\x01\x12\x1c\n\x0fobject_turn_rad\x18\r \x01(\x01H\x00\x88\x01\x01\x12\x11\n\tplan_only\x18\n \x01(\x08\"\x99\x01\n\x04Kind\x12\x14\n\x10KIND_UNSPECIFIED\x10\x00\x12\x11\n\rKIND_RELOCATE\x10\x01\x12\x13\n\x0fKIND_OFFER_HAND\x10\x02\x12\r\n\tKIND_TAKE\x10\x03\x12\x13\n\x0fKIND_PLACE_HELD\x10\x04\x12\r\n\tKIND_REST\x10\x05\x12\x10\n\x0cKIND_RELEASE\x10\x06\x12\x0e\n\nKIND_FETCH\x10\x07\x42\x12\n\x10_object_turn_rad\"+\n\x08Position\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\t\n\x01z\x18\x03 \x01(\x01\"\xb8\x04\n\x10RelocationStatus\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0f\n\x07goal_id\x18\x02 \x01(\t\x12\x34\n\x05state\x18\x03 \x01(\x0e\x32%.paramove.msgs.RelocationStatus.State\x12\r\n\x05phase\x18\x04 \x01(\t\x12\x0e\n\x06reason\x18\x05 \x01(\t\x12\x0f\n\x07holding\x18\x06 \x01(\x08\x12\x16\n\x0e\x65lbow_turn_rad\x18\x07 \x01(\x01\x12\x12\n\nin_the_way\x18\x08 \x03(\r\x12\x37\n\tfrom_hull\x18\t \x01(\x0e\x32$.paramove.msgs.RelocationStatus.Hull\x12\x35\n\x07to_hull\x18\n \x01(\x0e\x32$.paramove.msgs.RelocationStatus.Hull\x12\x0e\n\x06misfit\x18\x0b \x01(\x08\"\x91\x01\n\x05State\x12\x15\n\x11STATE_UNSPECIFIED\x10\x00\x12\x12\n\x0eSTATE_ACCEPTED\x10\x01\x12\x13\n\x0fSTATE_EXECUTING\x10\x02\x12\x13\n\x0fSTATE_SUCCEEDED\x10\x03\x12\x10\n\x0cSTATE_FAILED\x10\x04\x12\x12\n\x0eSTATE_REJECTED\x10\x05*\rSTATE_REFUSED\"?\n\x04Hull\x12\x14\n\x10HULL_UNSPECIFIED\x10\x00\x12\x0f\n\x0bHULL_INSIDE\x10\x01\x12\x10\n\x0cHULL_OUTSIDE\x10\x02\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1eparamove/msgs/relocation.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xb2\x04\n\x0eRelocationGoal\x12\n\n\x02id\x18\x01 \x01(\t\x12\x30\n\x04kind\x18\x02 \x01(\x0e\x32\".paramove.msgs.RelocationGoal.Kind\x12\x0e\n\x06object\x18\x03 \x01(\t\x12\r\n\x05\x66rame\x18\x04 \x01(\t\x12%\n\x04\x66rom\x18\x05 \x01(\x0b\x32\x17.paramove.msgs.Position\x12#\n\x02to\x18\x06 \x01(\x0b\x32\x17.paramove.msgs.Position\x12\x0f\n\x07\x61ttempt\x18\x07 \x01(\r\x12&\n\x05\x61void\x18\x08 \x03(\x0b\x32\x17.paramove.msgs.Position\x12\x13\n\x0b\x61sked_again\x18\t \x01(\x08\x12\x16\n\x0eobject_width_m\x18\x0b \x01(\x01\x12\x17\n\x0fobject_height_m\x18\x0c \x01(\x01\x12\x1c\n\x0fobject_turn_rad\x18\r \x01(\x01H\x00\x88\x01\x01\x12\x17\n\x0fobject_length_m\x18\x0e \x01(\x01\x12\x11\n\tplan_only\x18\n \x01(\x08\"\x99\x01\n\x04Kind\x12\x14\n\x10KIND_UNSPECIFIED\x10\x00\x12\x11\n\rKIND_RELOCATE\x10\x01\x12\x13\n\x0fKIND_OFFER_HAND\x10\x02\x12\r\n\tKIND_TAKE\x10\x03\x12\x13\n\x0fKIND_PLACE_HELD\x10\x04\x12\r\n\tKIND_REST\x10\x05\x12\x10\n\x0cKIND_RELEASE\x10\x06\x12\x0e\n\nKIND_FETCH\x10\x07\x42\x12\n\x10_object_turn_rad\"+\n\x08Position\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\t\n\x01z\x18\x03 \x01(\x01\"\xb8\x04\n\x10RelocationStatus\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0f\n\x07goal_id\x18\x02 \x01(\t\x12\x34\n\x05state\x18\x03 \x01(\x0e\x32%.paramove.msgs.RelocationStatus.State\x12\r\n\x05phase\x18\x04 \x01(\t\x12\x0e\n\x06reason\x18\x05 \x01(\t\x12\x0f\n\x07holding\x18\x06 \x01(\x08\x12\x16\n\x0e\x65lbow_turn_rad\x18\x07 \x01(\x01\x12\x12\n\nin_the_way\x18\x08 \x03(\r\x12\x37\n\tfrom_hull\x18\t \x01(\x0e\x32$.paramove.msgs.RelocationStatus.Hull\x12\x35\n\x07to_hull\x18\n \x01(\x0e\x32$.paramove.msgs.RelocationStatus.Hull\x12\x0e\n\x06misfit\x18\x0b \x01(\x08\"\x91\x01\n\x05State\x12\x15\n\x11STATE_UNSPECIFIED\x10\x00\x12\x12\n\x0eSTATE_ACCEPTED\x10\x01\x12\x13\n\x0fSTATE_EXECUTING\x10\x02\x12\x13\n\x0fSTATE_SUCCEEDED\x10\x03\x12\x10\n\x0cSTATE_FAILED\x10\x04\x12\x12\n\x0eSTATE_REJECTED\x10\x05*\rSTATE_REFUSED\"?\n\x04Hull\x12\x14\n\x10HULL_UNSPECIFIED\x10\x00\x12\x0f\n\x0bHULL_INSIDE\x10\x01\x12\x10\n\x0cHULL_OUTSIDE\x10\x02\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -33,15 +33,15 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'paramove.msgs.relocation_pb
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_RELOCATIONGOAL']._serialized_start=83
-  _globals['_RELOCATIONGOAL']._serialized_end=620
-  _globals['_RELOCATIONGOAL_KIND']._serialized_start=447
-  _globals['_RELOCATIONGOAL_KIND']._serialized_end=600
-  _globals['_POSITION']._serialized_start=622
-  _globals['_POSITION']._serialized_end=665
-  _globals['_RELOCATIONSTATUS']._serialized_start=668
-  _globals['_RELOCATIONSTATUS']._serialized_end=1236
-  _globals['_RELOCATIONSTATUS_STATE']._serialized_start=1026
-  _globals['_RELOCATIONSTATUS_STATE']._serialized_end=1171
-  _globals['_RELOCATIONSTATUS_HULL']._serialized_start=1173
-  _globals['_RELOCATIONSTATUS_HULL']._serialized_end=1236
+  _globals['_RELOCATIONGOAL']._serialized_end=645
+  _globals['_RELOCATIONGOAL_KIND']._serialized_start=472
+  _globals['_RELOCATIONGOAL_KIND']._serialized_end=625
+  _globals['_POSITION']._serialized_start=647
+  _globals['_POSITION']._serialized_end=690
+  _globals['_RELOCATIONSTATUS']._serialized_start=693
+  _globals['_RELOCATIONSTATUS']._serialized_end=1261
+  _globals['_RELOCATIONSTATUS_STATE']._serialized_start=1051
+  _globals['_RELOCATIONSTATUS_STATE']._serialized_end=1196
+  _globals['_RELOCATIONSTATUS_HULL']._serialized_start=1198
+  _globals['_RELOCATIONSTATUS_HULL']._serialized_end=1261
 # @@protoc_insertion_point(module_scope)

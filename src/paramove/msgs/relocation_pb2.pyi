@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class RelocationGoal(_message.Message):
-    __slots__ = ("id", "kind", "object", "frame", "to", "attempt", "avoid", "asked_again", "object_width_m", "object_height_m", "object_turn_rad", "plan_only")
+    __slots__ = ("id", "kind", "object", "frame", "to", "attempt", "avoid", "asked_again", "object_width_m", "object_height_m", "object_turn_rad", "object_length_m", "plan_only")
     class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         KIND_UNSPECIFIED: _ClassVar[RelocationGoal.Kind]
@@ -39,6 +39,7 @@ class RelocationGoal(_message.Message):
     OBJECT_WIDTH_M_FIELD_NUMBER: _ClassVar[int]
     OBJECT_HEIGHT_M_FIELD_NUMBER: _ClassVar[int]
     OBJECT_TURN_RAD_FIELD_NUMBER: _ClassVar[int]
+    OBJECT_LENGTH_M_FIELD_NUMBER: _ClassVar[int]
     PLAN_ONLY_FIELD_NUMBER: _ClassVar[int]
     id: str
     kind: RelocationGoal.Kind
@@ -51,8 +52,9 @@ class RelocationGoal(_message.Message):
     object_width_m: float
     object_height_m: float
     object_turn_rad: float
+    object_length_m: float
     plan_only: bool
-    def __init__(self, id: _Optional[str] = ..., kind: _Optional[_Union[RelocationGoal.Kind, str]] = ..., object: _Optional[str] = ..., frame: _Optional[str] = ..., to: _Optional[_Union[Position, _Mapping]] = ..., attempt: _Optional[int] = ..., avoid: _Optional[_Iterable[_Union[Position, _Mapping]]] = ..., asked_again: bool = ..., object_width_m: _Optional[float] = ..., object_height_m: _Optional[float] = ..., object_turn_rad: _Optional[float] = ..., plan_only: bool = ..., **kwargs) -> None: ...
+    def __init__(self, id: _Optional[str] = ..., kind: _Optional[_Union[RelocationGoal.Kind, str]] = ..., object: _Optional[str] = ..., frame: _Optional[str] = ..., to: _Optional[_Union[Position, _Mapping]] = ..., attempt: _Optional[int] = ..., avoid: _Optional[_Iterable[_Union[Position, _Mapping]]] = ..., asked_again: bool = ..., object_width_m: _Optional[float] = ..., object_height_m: _Optional[float] = ..., object_turn_rad: _Optional[float] = ..., object_length_m: _Optional[float] = ..., plan_only: bool = ..., **kwargs) -> None: ...
 
 class Position(_message.Message):
     __slots__ = ("x", "y", "z")

@@ -4,7 +4,7 @@ from .colour_tracker import ColourTracker as ColourTracker
 from .homography import HomographyError as HomographyError
 from .homography import PlaneHomography as PlaneHomography
 from .object_motion import MotionThresholds as MotionThresholds
+from .object_shape import ObjectShape as ObjectShape
 from .pointing import PointingThresholds as PointingThresholds
 from .recognizer import Recognizer as Recognizer
 from .recognizer import RecognizerOptions as RecognizerOptions
-from .upright_shape import UprightShape as UprightShape

@@ -13,10 +13,10 @@ from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.objects.full_size import FullSize
 from paramove.objects.homography import PlaneHomography
 from paramove.objects.object_motion import MotionThresholds, ObjectMotion, State, Transition
+from paramove.objects.object_shape import ObjectShape, object_shape
 from paramove.objects.openings import OpeningTracker
 from paramove.objects.pointing import Pointing, PointingThresholds
 from paramove.objects.sinking import Sample
-from paramove.objects.upright_shape import UprightShape, upright_shape
 
 HAND_SEEN_S = 0.18
 HAND_GONE_S = 0.5
@@ -166,7 +166,7 @@ class Recognizer:
             gesture.located, gesture.frame = True, homography.plane_frame
             depth, shape = 0.0, self._shape_of(name, homography)
             if shape is not None:
-                gesture.width_m, gesture.height_m = shape.width, shape.height
+                gesture.width_m, gesture.height_m, gesture.length_m = shape.width, shape.height, shape.length
                 if shape.turn is not None:
                     gesture.turn_rad = shape.turn
                 lower = (self._plane_height or shape.height) - shape.height
@@ -175,11 +175,11 @@ class Recognizer:
         gesture.twin = any(one.twin for one in tracked.objects if one.name == name)
         return gesture
 
-    def _shape_of(self, name: str, homography: PlaneHomography) -> UprightShape | None:
+    def _shape_of(self, name: str, homography: PlaneHomography) -> ObjectShape | None:
         """As it looked in the clearest view of its last rest; standing, if it may have been held up then."""
         with contextlib.suppress(ValueError):  # on the plane's horizon
             latest, standing = (
-                upright_shape(np.array(outlines.get(name, [])), homography)
+                object_shape(np.array(outlines.get(name, [])), homography)
                 for outlines in (self._outlines, self._standing)
             )
             held_up = latest is not None and standing is not None and latest.face > LARGER * standing.face

@@ -163,7 +163,7 @@ export class WorldView {
   // As it was seen, or as objects usually are.
   sizeOf(object) {
     const { radius, height } = this.state.world.object;
-    return object.size ?? { width: 2 * radius, height, turn: null };
+    return object.size ?? { width: 2 * radius, height, turn: null, length: 0 };
   }
 
   // Where an object is drawn: its middle, world frame; null where there is no estimate.
@@ -176,10 +176,12 @@ export class WorldView {
 
   objects() {
     return Object.entries(this.state.objects).flatMap(([name, object]) => {
-      const place = this.placeOf(object), { width, height, turn } = this.sizeOf(object), half = (turn ?? 0) / 2;
+      const place = this.placeOf(object), { width, height, turn, length } = this.sizeOf(object), half = (turn ?? 0) / 2;
       if (!place) return [];
-      const upright = multiply(rigid(place, [Math.cos(half), 0, 0, Math.sin(half)]), scaled(width / 2, width / 2, height / 2));
-      return [[turn === null ? "cylinder" : "box", upright, colourOf(name)]];
+      const tipped = length ? Math.PI / 4 : 0, [c, s] = [Math.cos(tipped), Math.sin(tipped)];
+      const turned = rigid(place, [Math.cos(half) * c, -Math.sin(half) * s, Math.cos(half) * s, Math.sin(half) * c]);
+      const solid = multiply(turned, scaled(width / 2, width / 2, (length || height) / 2));
+      return [[turn === null || length ? "cylinder" : "box", solid, colourOf(name)]];
     });
   }
 
