@@ -50,6 +50,7 @@ MODELS = {
     "node": SCHEMA["$defs"]["NodeSettings"],
     "bus": SCHEMA["$defs"]["BusSettings"],
     "budget": SCHEMA["$defs"]["RestartBudget"],
+    "host": SCHEMA["$defs"]["HostSettings"],
     "needed file": SCHEMA["$defs"]["NeededFile"],
 }
 

@@ -167,7 +167,7 @@ class LockstepBarrier:
         if answer.kind == TickDone.KIND_JOIN:
             if node in self._marks:
                 self._remove(node, "was started again")
-            if self._watch_process(node, answer.pid):
+            if self._watch_process(node, answer.watched_pid or answer.pid):
                 self._newcomers[node] = answer
             return True
         if node not in self._marks or self._marks[node][member_mark(node)][0] != answer.pid:

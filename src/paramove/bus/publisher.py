@@ -92,12 +92,19 @@ class Publisher:
         envelope = Envelope(self._schema, self._publisher, self.epoch, self.sequence, now_ns, captured_ns)
         if self.topic.profile is Profile.LATCHED:
             self._last = (envelope, payload)
-        if self._ring is not None and len(payload) >= SMALLEST:
-            with contextlib.suppress(OSError):  # no memory: by the socket, as smaller ones
-                payload, envelope = self._ring.write(payload, envelope), envelope._replace(flags=FLAG_RING)
-        self._send(envelope, payload)
+        self._share(envelope, payload)
         self.serve()
         return self.sequence
+
+    def forward(self, envelope: Envelope, payload: bytes) -> None:
+        """Publishes what the topic's publisher on another host has published, as it is. Never waits."""
+        if envelope.epoch != self.epoch:
+            self._last = None
+        self.epoch, self.sequence = envelope.epoch, envelope.sequence
+        if self.topic.profile is Profile.LATCHED and envelope.has_message:
+            self._last = (envelope, payload)
+        self._share(envelope, payload)
+        self.serve()
 
     def serve(self) -> None:
         """Answers the subscriptions that have come in since the last call."""
@@ -122,6 +129,13 @@ class Publisher:
             self._send(
                 Envelope(self._schema, self._publisher, self.epoch, self.sequence, 0, 0, flags=FLAG_WELCOME), b""
             )
+
+    def _share(self, envelope: Envelope, payload: bytes) -> None:
+        """Sends a large image by the ring, all else by the socket."""
+        if self._ring is not None and len(payload) >= SMALLEST:
+            with contextlib.suppress(OSError):  # no memory: by the socket, as smaller ones
+                payload, envelope = self._ring.write(payload, envelope), envelope._replace(flags=FLAG_RING)
+        self._send(envelope, payload)
 
     def _send(self, envelope: Envelope, payload: bytes) -> None:
         self.socket.send(self._frame + pack(envelope, payload), _NOBLOCK_SNDMORE)

@@ -25,6 +25,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "graph": ("paramove.cli.graph", "Draw the nodes and topics of a launch file, or of what is running."),
     "topic": ("paramove.cli.topic", "Look at topics, messages and rates on the bus."),
     "node": ("paramove.cli.node", "Look at the nodes on the bus."),
+    "host": ("paramove.cli.host", "Trust and check the other computers of a run."),
     "logs": ("paramove.cli.logs", "Show the log lines of a run's nodes, in the order of time."),
     "calibrate": ("paramove.cli.calibrate", "Print the calibration board; calibrate cameras."),
     "webcam": ("paramove.cli.webcam", "Fetch what tracking a person with a webcam needs."),

@@ -18,7 +18,7 @@ from rich.console import Console
 from paramove.cli.preparing import prepared
 from paramove.cli.set_up_view import open_where_displayed
 from paramove.dashboard import NAME, link_in
-from paramove.documents import DocumentError, exit_codes
+from paramove.documents import DocumentError, InputError, exit_codes
 from paramove.supervision import (
     DomainError,
     DomainNameError,
@@ -102,6 +102,9 @@ def _run(options: RunOptions, check_only: bool, output: QueuedOutput) -> int:
         if launch is not None and (left_out := _left_out(launch)):
             errors.print(f"note: --with replaces the default overlays; to apply them too: --with {left_out}")
         return exit_codes.CONFIGURATION
+    except InputError as error:
+        errors.print(str(error))
+        return error.exit_code
     except DomainError as error:
         errors.print(str(error))
         return exit_codes.TEMPORARY

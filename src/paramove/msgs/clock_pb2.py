@@ -24,7 +24,7 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x19paramove/msgs/clock.proto\x12\rparamove.msgs\"~\n\x05\x43lock\x12\x0f\n\x07time_ns\x18\x01 \x01(\x03\x12\x0c\n\x04tick\x18\x02 \x01(\x04\x12\x11\n\tperiod_ns\x18\x03 \x01(\x03\x12\x10\n\x08lockstep\x18\x04 \x01(\x08\x12+\n\tpublished\x18\x05 \x03(\x0b\x32\x18.paramove.msgs.TopicMarkR\x04said\";\n\tTopicMark\x12\r\n\x05topic\x18\x01 \x01(\t\x12\r\n\x05\x65poch\x18\x02 \x01(\r\x12\x10\n\x08sequence\x18\x03 \x01(\x04\"\xde\x01\n\x08TickDone\x12\x0c\n\x04node\x18\x01 \x01(\t\x12\x0b\n\x03pid\x18\x02 \x01(\r\x12*\n\x04kind\x18\x03 \x01(\x0e\x32\x1c.paramove.msgs.TickDone.Kind\x12\x0c\n\x04tick\x18\x04 \x01(\x04\x12+\n\tpublished\x18\x05 \x03(\x0b\x32\x18.paramove.msgs.TopicMark\"J\n\x04Kind\x12\x14\n\x10KIND_UNSPECIFIED\x10\x00\x12\r\n\tKIND_JOIN\x10\x01\x12\r\n\tKIND_DONE\x10\x02\x12\x0e\n\nKIND_LEAVE\x10\x03R\x04saidb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x19paramove/msgs/clock.proto\x12\rparamove.msgs\"~\n\x05\x43lock\x12\x0f\n\x07time_ns\x18\x01 \x01(\x03\x12\x0c\n\x04tick\x18\x02 \x01(\x04\x12\x11\n\tperiod_ns\x18\x03 \x01(\x03\x12\x10\n\x08lockstep\x18\x04 \x01(\x08\x12+\n\tpublished\x18\x05 \x03(\x0b\x32\x18.paramove.msgs.TopicMarkR\x04said\";\n\tTopicMark\x12\r\n\x05topic\x18\x01 \x01(\t\x12\r\n\x05\x65poch\x18\x02 \x01(\r\x12\x10\n\x08sequence\x18\x03 \x01(\x04\"\xf3\x01\n\x08TickDone\x12\x0c\n\x04node\x18\x01 \x01(\t\x12\x0b\n\x03pid\x18\x02 \x01(\r\x12*\n\x04kind\x18\x03 \x01(\x0e\x32\x1c.paramove.msgs.TickDone.Kind\x12\x0c\n\x04tick\x18\x04 \x01(\x04\x12+\n\tpublished\x18\x05 \x03(\x0b\x32\x18.paramove.msgs.TopicMark\x12\x13\n\x0bwatched_pid\x18\x06 \x01(\r\"J\n\x04Kind\x12\x14\n\x10KIND_UNSPECIFIED\x10\x00\x12\r\n\tKIND_JOIN\x10\x01\x12\r\n\tKIND_DONE\x10\x02\x12\x0e\n\nKIND_LEAVE\x10\x03R\x04saidb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -36,7 +36,7 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_TOPICMARK']._serialized_start=172
   _globals['_TOPICMARK']._serialized_end=231
   _globals['_TICKDONE']._serialized_start=234
-  _globals['_TICKDONE']._serialized_end=456
-  _globals['_TICKDONE_KIND']._serialized_start=376
-  _globals['_TICKDONE_KIND']._serialized_end=450
+  _globals['_TICKDONE']._serialized_end=477
+  _globals['_TICKDONE_KIND']._serialized_start=397
+  _globals['_TICKDONE_KIND']._serialized_end=471
 # @@protoc_insertion_point(module_scope)

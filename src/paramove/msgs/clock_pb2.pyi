@@ -31,7 +31,7 @@ class TopicMark(_message.Message):
     def __init__(self, topic: _Optional[str] = ..., epoch: _Optional[int] = ..., sequence: _Optional[int] = ...) -> None: ...
 
 class TickDone(_message.Message):
-    __slots__ = ("node", "pid", "kind", "tick", "published")
+    __slots__ = ("node", "pid", "kind", "tick", "published", "watched_pid")
     class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         KIND_UNSPECIFIED: _ClassVar[TickDone.Kind]
@@ -47,9 +47,11 @@ class TickDone(_message.Message):
     KIND_FIELD_NUMBER: _ClassVar[int]
     TICK_FIELD_NUMBER: _ClassVar[int]
     PUBLISHED_FIELD_NUMBER: _ClassVar[int]
+    WATCHED_PID_FIELD_NUMBER: _ClassVar[int]
     node: str
     pid: int
     kind: TickDone.Kind
     tick: int
     published: _containers.RepeatedCompositeFieldContainer[TopicMark]
-    def __init__(self, node: _Optional[str] = ..., pid: _Optional[int] = ..., kind: _Optional[_Union[TickDone.Kind, str]] = ..., tick: _Optional[int] = ..., published: _Optional[_Iterable[_Union[TopicMark, _Mapping]]] = ...) -> None: ...
+    watched_pid: int
+    def __init__(self, node: _Optional[str] = ..., pid: _Optional[int] = ..., kind: _Optional[_Union[TickDone.Kind, str]] = ..., tick: _Optional[int] = ..., published: _Optional[_Iterable[_Union[TopicMark, _Mapping]]] = ..., watched_pid: _Optional[int] = ...) -> None: ...

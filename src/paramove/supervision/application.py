@@ -6,15 +6,19 @@ import contextlib
 import datetime
 import logging
 import os
+import socket
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from paramove.supervision.agent import release_of
+from paramove.supervision.distribution import distributed
 from paramove.supervision.domain import held_domain
 from paramove.supervision.environment import DEFAULT_DOMAIN, allow_open_files
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
+from paramove.supervision.remote_host import RemoteHost
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervisor import Outcome, Supervisor, View
 from paramove.supervision.wiring import check_wiring, clock_publisher, read_interfaces
@@ -44,19 +48,23 @@ def run(
     Raises DocumentError, LimitError, DomainError (another run holds the domain) or OSError (run folder).
     """
     interfaces = check(launch, workspace)
+    clock = clock_publisher(interfaces)
+    launch = distributed(launch, interfaces)
     allow_open_files()
     name = os.environ.get("PARAMOVE_DOMAIN") or DEFAULT_DOMAIN
     with _private_files(), held_domain(name, f"paramove launch {launch.name}") as domain:
         begun = datetime.datetime.now().astimezone()
         folder = RunFolder.create((runs or workspace.root / "runs").resolve(), begun)
         folder.write_effective(launch)
-        folder.write_configs(launch, domain.folder, domain.truth_folder, clock_publisher(interfaces))
+        folder.write_configs(launch, domain.folder, domain.truth_folder, clock)
         facts = _facts(launch, workspace, domain.name, begun)
         if launch.file.bus.clock == "monotonic":
             facts["begun_ns"] = folder.begun_ns
         folder.write_run(facts)
-        supervisor = Supervisor(launch, workspace, folder, domain, make_view(folder))
-        outcome = supervisor.run()
+        with contextlib.ExitStack() as connected:
+            hosts = _remote_hosts(launch, workspace, folder, domain.name, clock, connected)
+            supervisor = Supervisor(launch, workspace, folder, domain, make_view(folder), hosts)
+            outcome = supervisor.run()
         ended = datetime.datetime.now().astimezone()
         facts["outcome"] = {
             "exit_code": outcome.code,
@@ -79,6 +87,31 @@ def run(
         except OSError as error:  # a full disk does not change how the run ended
             _log.warning("the outcome could not be written to %s: %s", folder.path / "run.yaml", error.strerror)
     return outcome, folder
+
+
+def _remote_hosts(
+    launch: Launch,
+    workspace: Workspace,
+    folder: RunFolder,
+    domain: str,
+    clock: str | None,
+    connected: contextlib.ExitStack,
+) -> dict[str, RemoteHost]:
+    """Connects to the other hosts; raises InputError for one that does not take part."""
+    begin = {
+        "launch": launch.file.model_dump(mode="json"),
+        "name": launch.name,
+        "domain": domain,
+        "clock": clock,
+        "launcher": socket.gethostname(),
+        "release": release_of(workspace) if launch.file.hosts else "",
+    }
+    hosts = {}
+    for name, settings in launch.file.hosts.items():
+        if settings.ssh is not None:
+            hosts[name] = RemoteHost(name, settings, begin, folder)
+            connected.callback(hosts[name].close)
+    return hosts
 
 
 @contextlib.contextmanager

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from paramove.bus import CLOCK, Topic, inspection, topics
+from paramove.supervision.distribution import on_bus
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
-from paramove.supervision.wiring import on_bus
 
 MANY = 10
 """A node with so many subscriptions is a collector, such as the recorder: they are counted, not drawn."""

@@ -41,12 +41,25 @@ class RestartBudget(_Checked):
     window_s: Seconds = Field(default=300.0, description="within this time")
 
 
+class HostSettings(_Checked):
+    """A computer of the run."""
+
+    ssh: str | None = Field(default=None, description="its name for `ssh`; null: this computer")
+    address: str | None = Field(
+        default=None, description="of its relay, for the other hosts; null: as ssh finds it, or as they reach this one"
+    )
+    port: int = Field(default=47110, ge=1024, le=65534, description="TCP port of its relay; images take the next one")
+    folder: str | None = Field(default=None, description="where paramove is started there; null: the home folder")
+    command: str = Field(default="paramove", description="how paramove is started there")
+
+
 class NodeSettings(_Checked):
     """One process of the run."""
 
     module: Module = Field(description="Python module that is started, such as nodes.camera")
     parameters: dict[str, Any] = Field(default_factory=dict, description="checked by the node's own Config")
     remaps: dict[str, str] = Field(default_factory=dict, description="topic name in the node: topic name on the bus")
+    host: Name | None = Field(default=None, description="where it runs; null: on the host without `ssh`")
     restart: Literal["never", "on-failure", "always"] = Field(
         default="never", description="reaction to its end: none; a restart after a failure; a restart in any case"
     )
@@ -102,6 +115,9 @@ class LaunchFile(_Checked):
 
     description: str = Field(default="", description="what the application does, for people")
     bus: BusSettings = Field(default=BusSettings(), description="clock and lockstep")
+    hosts: dict[Name, HostSettings] = Field(
+        default_factory=dict, description="computers of the run by their names, one of them without `ssh`"
+    )
     nodes: dict[Name, NodeSettings] = Field(min_length=1, description="name of the node: how it runs")
     default_overlays: list[str] = Field(default_factory=list, description="overlays applied without --with")
     seed_parameters: list[str] = Field(default_factory=list, description="node.parameter that --seed sets")

@@ -12,7 +12,9 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import IO, Protocol, Self
+
+import psutil
 
 from paramove.documents import printable
 
@@ -57,6 +59,20 @@ class Guard:
             with contextlib.suppress(BrokenPipeError):  # the guard was killed: the kernel's SIGTERM remains
                 self._process.stdin.write(line + "\n")
                 self._process.stdin.flush()
+
+
+class NodeProcess(Protocol):
+    """A node's process as its supervisor sees it; see `SupervisedProcess`."""
+
+    pid: int
+    pidfd: int
+
+    def prioritise(self, nice: int) -> None: ...
+    def ended(self) -> int | None: ...
+    def halted(self) -> bool | None: ...
+    def memory_mb(self) -> float: ...
+    def terminate(self) -> None: ...
+    def kill(self) -> None: ...
 
 
 class SupervisedProcess:
@@ -134,6 +150,13 @@ class SupervisedProcess:
                 if os.waitid(os.P_PID, self.pid, flag | os.WNOHANG) is not None:
                     halted = meaning
         return halted
+
+    def memory_mb(self) -> float:
+        """What it uses, 0 if it has just ended."""
+        try:
+            return float(psutil.Process(self.pid).memory_info().rss) / 2**20
+        except psutil.Error:
+            return 0.0
 
     def terminate(self) -> None:
         """Requests the process to end. It alone gets the signal: it ends its own children in order."""

@@ -65,17 +65,22 @@ class RunFolder:
         """Writes `launch.yaml`: the launch file after overlays, settings and defaults."""
         _write(self.path / "launch.yaml", launch.file.model_dump(mode="json"))
 
-    def write_configs(self, launch: Launch, bus_folder: Path, truth_folder: Path, clock: str | None = None) -> None:
-        """Writes the configuration of every node.
+    def write_configs(
+        self, launch: Launch, bus_folder: Path, truth_folder: Path, clock: str | None = None, host: str | None = None
+    ) -> None:
+        """Writes the configuration of every node of one host.
 
         Args:
             launch: Names nodes and parameters.
             bus_folder: Of the sockets.
             truth_folder: Of the sockets of the ground truth; only nodes with `truth: true` get it.
             clock: Node that publishes the clock; in lockstep it gets the list of members.
+            host: Name of the host; None for the nodes without one.
         """
         lockstep = launch.file.bus.lockstep
         for name, node in launch.file.nodes.items():
+            if node.host != host:
+                continue
             bus: dict[str, Any] = {
                 "folder": str(bus_folder),
                 "clock": launch.file.bus.clock,

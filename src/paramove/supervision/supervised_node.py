@@ -6,12 +6,11 @@ import enum
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-import psutil
-
 from paramove.documents import FAILURE, NEVER_RESTARTED, OK, describe, printable
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.supervision.launch_schema import NodeSettings
-from paramove.supervision.processes import SupervisedProcess
+from paramove.supervision.processes import NodeProcess
+from paramove.supervision.stopping import STOP_S
 
 LONGEST_BACKOFF_S = 30.0
 
@@ -44,8 +43,6 @@ _STATE_OF_STATUS = {
 
 _AT_WORK = (State.READY, State.DEGRADED, State.FAILED)
 MEASURE_PERIOD_S = 1.0
-STOP_S = 5.0
-"""From SIGTERM to SIGKILL."""
 MAX_CHECK_INTERVAL_S = 0.5
 """At most this much time without status counts per check: a launcher that was itself stopped received nothing."""
 
@@ -76,7 +73,7 @@ class SupervisedNode:
         self,
         name: str,
         settings: NodeSettings,
-        spawn: Callable[[str], SupervisedProcess],
+        spawn: Callable[[str], NodeProcess],
         on_change: Callable[[SupervisedNode], None],
     ) -> None:
         self.name = name
@@ -89,7 +86,7 @@ class SupervisedNode:
         self.exit_reason = ""
         self.came_back = ""
         self.status = NodeStatus()
-        self.process: SupervisedProcess | None = None
+        self.process: NodeProcess | None = None
         self.pid = 0
         self._spawn = spawn
         self._on_change = on_change
@@ -168,7 +165,7 @@ class SupervisedNode:
             return None
         self._follow(self.process.halted(), now_s)
         if not self._killed_for:
-            self._killed_for = self._fault(self.process.pid, now_s)
+            self._killed_for = self._fault(self.process, now_s)
             if self._killed_for:
                 self._become(self.state, f"{self._killed_for}, so it is killed", "fault")
                 self.process.kill()
@@ -188,7 +185,7 @@ class SupervisedNode:
             self._no_status_s = 0.0
             self._become(self._before if self.state is State.SUSPENDED else self.state, "is continued", "resumed")
 
-    def _fault(self, pid: int, now_s: float) -> str:
+    def _fault(self, process: NodeProcess, now_s: float) -> str:
         """Why the process has to be killed, in words that follow its name; empty if it is healthy."""
         settings = self.settings
         if self.state is State.SUSPENDED:
@@ -203,7 +200,7 @@ class SupervisedNode:
             return f"hangs: no status for {settings.silent_timeout_s:g} s, last message: {last}"
         if settings.memory_limit_mb is not None and now_s >= self._measure_due_s:
             self._measure_due_s = now_s + MEASURE_PERIOD_S
-            used_mb = _memory_mb(pid)
+            used_mb = process.memory_mb()
             if used_mb > settings.memory_limit_mb:
                 return f"used {used_mb:.0f} MB of memory, its limit is {settings.memory_limit_mb:g} MB"
         return ""
@@ -288,13 +285,6 @@ class SupervisedNode:
     def _become(self, state: State, detail: str, event: str) -> None:
         self.state, self.detail, self.event = state, detail, event
         self._on_change(self)
-
-
-def _memory_mb(pid: int) -> float:
-    try:
-        return float(psutil.Process(pid).memory_info().rss) / 2**20
-    except psutil.Error:  # it has just ended
-        return 0.0
 
 
 @dataclass(frozen=True)

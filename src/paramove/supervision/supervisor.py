@@ -7,9 +7,9 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from types import FrameType, TracebackType
+from types import FrameType, MappingProxyType, TracebackType
 from typing import Any, Protocol, Self
 
 from paramove.documents import exit_codes
@@ -19,12 +19,13 @@ from paramove.supervision.control import Answer, ControlServer
 from paramove.supervision.domain import Domain
 from paramove.supervision.environment import node_environment
 from paramove.supervision.events import EventLog, signal_name
-from paramove.supervision.launch_file import Launch, start_waves
-from paramove.supervision.launch_schema import LaunchFile
-from paramove.supervision.processes import Guard, SupervisedProcess, last_lines
+from paramove.supervision.launch_file import Launch
+from paramove.supervision.processes import Guard, NodeProcess, SupervisedProcess, last_lines
+from paramove.supervision.remote_host import RemoteHost
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.status_subscriber import StatusSubscriber
-from paramove.supervision.supervised_node import ENDED, STOP_S, State, SupervisedNode
+from paramove.supervision.stopping import STOP_S, stop_waves
+from paramove.supervision.supervised_node import ENDED, State, SupervisedNode
 from paramove.workspace import Workspace
 
 _ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -82,14 +83,24 @@ class Supervisor:
         run_folder: Of this run; configurations of the nodes are written there before.
         domain: Folders of the bus.
         view: Shows what happens.
+        hosts: The other hosts of the run, by name.
     """
 
-    def __init__(self, launch: Launch, workspace: Workspace, run_folder: RunFolder, domain: Domain, view: View) -> None:
+    def __init__(
+        self,
+        launch: Launch,
+        workspace: Workspace,
+        run_folder: RunFolder,
+        domain: Domain,
+        view: View,
+        hosts: Mapping[str, RemoteHost] = MappingProxyType({}),
+    ) -> None:
         self._file = launch.file
         self._judge_options = ["--no-video"] if launch.headless else []
         self._workspace = workspace.root
         self._folder = run_folder
         self._view = view
+        self._hosts = dict(hosts)
         self._interrupts = Interrupts()
         self.nodes = {
             name: SupervisedNode(name, node, self._spawn_node, self._changed) for name, node in self._file.nodes.items()
@@ -166,7 +177,8 @@ class Supervisor:
         Returns the nodes that have just ended, with exit codes.
         """
         poll = select.poll()
-        for descriptor in (self._interrupts.wake_fd, *self._control.descriptors):
+        remote = (host.descriptor for host in self._hosts.values() if not host.lost)
+        for descriptor in (self._interrupts.wake_fd, *self._control.descriptors, *remote):
             poll.register(descriptor, select.POLLIN)
         for node in self.nodes.values():
             if node.process is not None:
@@ -176,11 +188,19 @@ class Supervisor:
             _drain(self._interrupts.wake_fd)
         self._ignore_suspension()
         self._control.serve()
+        self._serve_hosts()
         statuses.listen()
         now_s = time.monotonic()
         checked = [(node, node.check(now_s)) for node in self.nodes.values()]
         self._view.refresh(self.nodes.values())
         return [(node, code) for node, code in checked if code is not None]
+
+    def _serve_hosts(self) -> None:
+        for name, host in self._hosts.items():
+            connected = not host.lost
+            host.serve()
+            if host.lost and connected:
+                self._view.problem(f"the connection to {name} is lost: {host.lost}. Its nodes end by themselves there")
 
     def _outcome(self, limit_s: float) -> Outcome | None:
         """The outcome if the run has come to its end."""
@@ -266,8 +286,11 @@ class Supervisor:
             return Outcome(code if code > 0 else exit_codes.FAILURE, f"{outcome.reason}; {module}: exit code {code}")
         return outcome
 
-    def _spawn_node(self, name: str) -> SupervisedProcess:
-        command = [sys.executable, "-m", self._file.nodes[name].module, "--config", str(self._folder.config(name))]
+    def _spawn_node(self, name: str) -> NodeProcess:
+        node = self._file.nodes[name]
+        if node.host is not None:
+            return self._hosts[node.host].start(name, NICE[node.priority])
+        command = [sys.executable, "-m", node.module, "--config", str(self._folder.config(name))]
         process = SupervisedProcess(
             command,
             folder=self._workspace,
@@ -275,7 +298,7 @@ class Supervisor:
             guard=self._guard,
             log=self._folder.log(name),
         )
-        process.prioritise(NICE[self._file.nodes[name].priority])
+        process.prioritise(NICE[node.priority])
         return process
 
     def _handle_status(self, status: NodeStatus) -> None:
@@ -286,14 +309,6 @@ class Supervisor:
         path = self._folder.log(node.name)
         lines = "\n".join(f"    {line}" for line in last_lines(path, 20))
         self._view.problem(f"{node.name} {node.detail}. Last lines of {path}:\n{lines or '    (empty)'}")
-
-
-def stop_waves(file: LaunchFile) -> list[list[str]]:
-    """Nodes in the order of their end."""
-    first = [name for name, node in file.nodes.items() if node.stop == "first"]
-    last = [name for name, node in file.nodes.items() if node.stop == "last"]
-    between = [[name for name in wave if name not in (*first, *last)] for wave in reversed(start_waves(file))]
-    return [wave for wave in (first, *between, last) if wave]
 
 
 def _drain(wake_fd: int) -> None:

@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 
 from paramove.bus import CLOCK, Topic, topics
 from paramove.documents import DocumentError, nearest, raise_any
+from paramove.supervision.distribution import on_bus, wrong_hosts
 from paramove.supervision.interfaces import Interface, InterfaceError, read_interface, source_of
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.parameters import wrong_parameters
@@ -52,17 +53,13 @@ def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Itera
     yield from _clock(launch, interfaces)
     yield from _publishers(launch, interfaces)
     yield from _subscribers(launch, interfaces)
+    yield from wrong_hosts(launch, interfaces)
     yield from _named_topics(launch, interfaces)
 
 
 def clock_publisher(interfaces: Mapping[str, Interface]) -> str | None:
     """Node that publishes the clock; None where there is none."""
     return next((name for name, interface in interfaces.items() if CLOCK in interface.publishes), None)
-
-
-def on_bus(launch: Launch, node: str, topic: Topic) -> str:
-    """Name on the bus of a topic of a node, after its remaps."""
-    return launch.file.nodes[node].remaps.get(topic.name, topic.name)
 
 
 def unpublished(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[tuple[str, Topic]]:

@@ -1,0 +1,250 @@
+"""The two ends of a link between hosts: ZeroMQ's TCP with CURVE both ways.
+
+Each relay offers its topics at a ROUTER and asks the other hosts for theirs with a DEALER. Who asks is known by its key
+alone: it is pinned, so no host can take another one's place, and gets only what the launch file lets cross to it. What
+a host gives is checked against the topics that may come from it. Frames, after the kind of the message:
+
+    WANT     time of sending, names of topics       asker to offerer, 25 times a second
+    BEAT     that time, the offerer's time          the reply
+    MESSAGE  topic and header, payload              offerer to asker
+    TAKEN    name of a topic                        asker to offerer: an image has arrived, send the next
+    DONE     header, answer                         asker to offerer: a member of lockstep has answered
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import struct
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import zmq
+from zmq.auth.thread import ThreadAuthenticator
+
+from paramove.bus import ForeignConnections, can_read
+from paramove.hosts.keys import KeyPair
+from paramove.hosts.settings import Peer
+
+WANT, BEAT, MESSAGE, TAKEN, DONE = b"W", b"B", b"M", b"C", b"D"
+BEAT_S = 0.04
+LOST_S = 2.0
+"""Without a reply for so long, a link counts as lost."""
+MAX_ASKED_BYTES = 65_536
+_TIME, _TIMES = struct.Struct("<q"), struct.Struct("<qq")
+_log = logging.getLogger(__name__)
+
+
+@dataclass
+class Asker:
+    """A connected host, while it asks.
+
+    Attributes:
+        host: Its name.
+        wanted: Names of the topics that it wants and may have.
+        latest_s: When it asked last.
+        under_way: By topic, how many images it has not confirmed.
+        waiting: By topic, the latest image that waits until it has.
+    """
+
+    host: str
+    wanted: frozenset[str] = frozenset()
+    latest_s: float = 0.0
+    under_way: Counter[str] = field(default_factory=Counter)
+    waiting: dict[str, list[bytes]] = field(default_factory=dict)
+
+
+class Gatekeeper:
+    """Lets only those hosts connect whose keys are pinned; a thread of pyzmq answers for it.
+
+    Attributes:
+        rejected: How many connections had another key.
+    """
+
+    def __init__(self, context: zmq.Context[Any], hosts: Mapping[str, str]) -> None:
+        self._keys = {key.encode("ascii") for key in hosts.values()}
+        self.rejected = 0
+        self._authenticator = ThreadAuthenticator(context)
+        self._authenticator.start()
+        self._authenticator.configure_curve_callback("*", self)
+        self._authenticator.configure_curve_callback("paramove", self)
+
+    def callback(self, domain: str, key: bytes) -> bool:
+        """Whether this key may connect; called by pyzmq."""
+        known = key in self._keys
+        self.rejected += not known
+        if self.rejected == 10 ** (len(str(self.rejected)) - 1) and not known:
+            _log.warning("a computer with the unknown key %s was rejected (number %d)", key.decode(), self.rejected)
+        return known
+
+    def close(self) -> None:
+        """Ends the thread."""
+        self._authenticator.stop()
+
+
+class Offer:
+    """The offering end, for all hosts.
+
+    Args:
+        context: With a `Gatekeeper`.
+        endpoint: Where it is bound, `tcp://ADDRESS:PORT`.
+        own: Keys of this host.
+        peers: The hosts that may ask.
+        name: For the log.
+
+    Attributes:
+        askers: Those who are connected, by their identity.
+        blocked: Messages for which a slow link had no room.
+        rejected: Requests that a host may not make.
+        foreign: Connections that did not speak ZeroMQ with CURVE.
+    """
+
+    def __init__(
+        self, context: zmq.Context[Any], endpoint: str, own: KeyPair, peers: Mapping[str, Peer], name: str
+    ) -> None:
+        self.askers: dict[bytes, Asker] = {}
+        self.blocked = self.rejected = 0
+        self._hosts = {peer.key: host for host, peer in peers.items()}
+        self._may_have = {host: frozenset(peer.wants) for host, peer in peers.items()}
+        self.socket: zmq.Socket[Any] = context.socket(zmq.ROUTER)
+        self.socket.setsockopt(zmq.CURVE_SERVER, 1)
+        self.socket.setsockopt_string(zmq.CURVE_SECRETKEY, own.secret)
+        self.socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
+        self.socket.setsockopt(zmq.SNDHWM, 1000)
+        self.socket.setsockopt(zmq.MAXMSGSIZE, MAX_ASKED_BYTES)
+        _keep_alive(self.socket)
+        self.foreign = ForeignConnections(self.socket, name)
+        self.socket.bind(endpoint)
+
+    def requests(self) -> Iterator[tuple[Asker, bytes, list[bytes], frozenset[str]]]:
+        """What has come in: who asks, kind, frames, and the topics that it wants and did not want before."""
+        while can_read(self.socket):
+            frames = self.socket.recv_multipart(zmq.NOBLOCK, copy=False)
+            identity, content = frames[0].bytes, [frame.bytes for frame in frames[1:]]
+            asker = self.askers.get(identity)
+            if asker is None:
+                host = self._hosts.get(str(frames[-1].get("User-Id")), "")
+                asker = self.askers[identity] = Asker(host)
+            asker.latest_s = time.monotonic()
+            new: frozenset[str] = frozenset()
+            if content[:1] == [WANT] and len(content) == 3 and len(content[1]) == _TIME.size:
+                names = frozenset(filter(None, content[2].decode("utf-8", "replace").split("\n")))
+                allowed = names & self._may_have.get(asker.host, frozenset())
+                self.rejected += allowed != names
+                new, asker.wanted = allowed - asker.wanted, allowed
+                sent = _TIME.unpack(content[1])[0]
+                self.send(identity, BEAT, _TIMES.pack(sent, time.monotonic_ns()))
+            elif content[:1] not in ([TAKEN], [DONE]):
+                self.rejected += 1
+                continue
+            yield asker, content[0], content[1:], new
+
+    def forget_silent(self) -> None:
+        """Hosts that do not ask any more have gone."""
+        now_s = time.monotonic()
+        self.askers = {one: asker for one, asker in self.askers.items() if now_s - asker.latest_s < LOST_S}
+
+    def send(self, identity: bytes, *frames: bytes) -> bool:
+        """Sends to one host; whether it could be sent at once."""
+        try:
+            self.socket.send_multipart([identity, *frames], zmq.NOBLOCK)
+        except zmq.Again:
+            self.blocked += 1
+            return False
+        except zmq.ZMQError as error:
+            if error.errno != zmq.EHOSTUNREACH:
+                raise
+            self.askers.pop(identity, None)
+            return False
+        return True
+
+    def close(self) -> None:
+        """Closes the socket."""
+        self.foreign.close()
+        self.socket.close(linger=200)
+
+
+class Request:
+    """The asking end, to one host.
+
+    Args:
+        context: Of ZeroMQ.
+        port: Of the offer there.
+        own: Keys of this host.
+        peer: Whom it asks: its pinned key must be the one there.
+        names: Of the topics that it wants.
+
+    Attributes:
+        rejected: Messages of topics that may not come from there.
+        round_trip_s: The shortest of the last ten seconds.
+        offset_s: By how much the clock there is ahead, to half of the round trip.
+        latest_s: When a reply came last, 0 before the first.
+    """
+
+    def __init__(self, context: zmq.Context[Any], port: int, own: KeyPair, peer: Peer, names: frozenset[str]) -> None:
+        self.names = names
+        self.rejected = 0
+        self.round_trip_s = self.offset_s = float("nan")
+        self.latest_s = 0.0
+        self._best_s = float("-inf")
+        self.socket: zmq.Socket[Any] = context.socket(zmq.DEALER)
+        self.socket.setsockopt_string(zmq.CURVE_SERVERKEY, peer.key)
+        self.socket.setsockopt_string(zmq.CURVE_PUBLICKEY, own.public)
+        self.socket.setsockopt_string(zmq.CURVE_SECRETKEY, own.secret)
+        self.socket.setsockopt(zmq.RCVHWM, 1000)
+        self.socket.setsockopt(zmq.RECONNECT_IVL, 50)
+        self.socket.setsockopt(zmq.RECONNECT_IVL_MAX, 500)
+        _keep_alive(self.socket)
+        self.socket.connect(f"tcp://{peer.address}:{port}")
+
+    @property
+    def is_up(self) -> bool:
+        """Whether the host replies."""
+        return time.monotonic() - self.latest_s < LOST_S
+
+    def ask(self) -> None:
+        """Asks for the topics; the reply measures the way there and back."""
+        self.send(WANT, _TIME.pack(time.monotonic_ns()), "\n".join(sorted(self.names)).encode())
+
+    def send(self, *frames: bytes) -> None:
+        """Sends, unless the connection is down and too much waits already."""
+        with contextlib.suppress(zmq.Again):
+            self.socket.send_multipart(frames, zmq.NOBLOCK)
+
+    def messages(self) -> Iterator[tuple[str, bytes, bytes]]:
+        """What has come in: name on the bus, header, payload."""
+        while can_read(self.socket):
+            frames = self.socket.recv_multipart(zmq.NOBLOCK)
+            if frames[0] == BEAT and len(frames) == 2 and len(frames[1]) == _TIMES.size:
+                self._measure(*_TIMES.unpack(frames[1]))
+                continue
+            name, mark, header = frames[1].partition(b"\0") if len(frames) == 3 else (b"", b"", b"")
+            if frames[0] != MESSAGE or not mark or name.decode("utf-8", "replace") not in self.names:
+                self.rejected += 1
+                if self.rejected == 10 ** (len(str(self.rejected)) - 1):
+                    _log.warning("a message of %r is not to come from there (number %d)", name[:80], self.rejected)
+                continue
+            yield name.decode(), header, frames[2]
+
+    def close(self) -> None:
+        """Closes the socket."""
+        self.socket.close(linger=200)
+
+    def _measure(self, sent_ns: int, there_ns: int) -> None:
+        """One way cannot take longer than both: half the shortest round trip bounds the offset's error."""
+        now_ns, self.latest_s = time.monotonic_ns(), time.monotonic()
+        round_trip_s = 1e-9 * (now_ns - sent_ns)
+        if not round_trip_s > self.round_trip_s or self.latest_s - self._best_s > 10.0:
+            self._best_s, self.round_trip_s = self.latest_s, round_trip_s
+            self.offset_s = 1e-9 * (there_ns - (sent_ns + now_ns) / 2)
+
+
+def _keep_alive(socket: zmq.Socket[Any]) -> None:
+    """A cut that TCP would notice after minutes ends the connection, and it is made anew."""
+    socket.setsockopt(zmq.HEARTBEAT_IVL, 500)
+    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, round(1000 * LOST_S))
+    socket.setsockopt(zmq.HEARTBEAT_TTL, round(1000 * LOST_S))
+    socket.setsockopt(zmq.IPV6, 0)

@@ -1,0 +1,361 @@
+"""Forwards the topics that cross between this host and others, each once per host, as they are.
+
+A topic's messages keep epoch and sequence of their publisher, so that a subscriber on another host counts what is lost
+exactly as one on the same host. Images have a connection of their own, so that they never delay a stop, and only the
+latest one waits for a slow link. In lockstep the members' answers cross as well: the simulator's host watches the relay
+in place of a member, and the relay on the member's host reports its end.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+import os
+import time
+from typing import Any
+
+import zmq
+from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
+
+from paramove.bus import (
+    FLAG_LAST_VALUE,
+    FLAG_RING,
+    FLAG_WELCOME,
+    SERVICE,
+    SIZE,
+    Bus,
+    Envelope,
+    Ownership,
+    Publisher,
+    RejectedError,
+    Subscriber,
+    can_read,
+    member_mark,
+    pack,
+    schema_hash,
+    socket_path,
+    topics,
+    unpack,
+)
+from paramove.bus.topics import Profile, Topic
+from paramove.hosts.keys import HostKeyError, HostKeys
+from paramove.hosts.link import BEAT_S, DONE, MESSAGE, TAKEN, Asker, Gatekeeper, Offer, Request
+from paramove.hosts.settings import RelaySettings
+from paramove.msgs.clock_pb2 import TickDone, TopicMark
+
+UNDER_WAY = 2
+"""Images of a topic on their way to a host at once."""
+MAX_ANSWER_BYTES = 65_536
+_POLL_MS = 20
+_LOOK_S = 0.25
+_log = logging.getLogger(__name__)
+
+
+class Relay:
+    """One host's relay, while it is a context.
+
+    Args:
+        bus: Of its node; used for its status, folder and name.
+        settings: What crosses, and how the hosts are reached.
+
+    Attributes:
+        detail: The links, for people; renewed every second.
+    """
+
+    def __init__(self, bus: Bus, settings: RelaySettings) -> None:
+        self._bus, self._settings = bus, settings
+        self._opened = contextlib.ExitStack()
+        keys = HostKeys(settings.keys)
+        own, trusted = keys.own(), set(keys.trusted().values())
+        if strangers := [host for host, peer in settings.peers.items() if peer.key not in trusted]:
+            names = ", ".join(strangers)
+            raise HostKeyError(f"the keys of {names} are not trusted here: `paramove host trust`, from the launcher")
+        self._owned = self._opened.enter_context(contextlib.ExitStack())  # released after the contexts have ended
+        self._here: zmq.Context[Any] = self._opened.enter_context(zmq.Context())
+        away: zmq.Context[Any] = self._opened.enter_context(zmq.Context())
+        self._gate = Gatekeeper(away, {host: peer.key for host, peer in settings.peers.items()})
+        self._opened.callback(self._gate.close)
+        self._poller = zmq.Poller()
+        endpoint = f"tcp://{settings.address}:"
+        self._offers = tuple(
+            Offer(away, f"{endpoint}{settings.port + index}", own, settings.peers, f"relay {name}")
+            for index, name in enumerate(("topics", "images"))
+        )
+        self._requests: dict[str, tuple[Request, Request]] = {}
+        self._topics: dict[str, Topic] = {}
+        self._sources: dict[str, _Source] = {}
+        self._publishers: dict[str, Publisher] = {}
+        for host, peer in settings.peers.items():
+            rows = {name: topics.by_name(row) for name, row in {**peer.wants, **peer.gives}.items()}
+            self._topics |= rows
+            for name in peer.wants:
+                self._sources.setdefault(name, _Source(self._here, bus.settings.folder, rows[name], name))
+            images = frozenset(name for name in peer.gives if rows[name].is_image)
+            self._requests[host] = (
+                Request(away, peer.port, own, peer, frozenset(peer.gives) - images),
+                Request(away, peer.port + 1, own, peer, images),
+            )
+        self._answers = _Answers(self._here, bus) if settings.clock_from else None
+        self._members: dict[str, zmq.Socket[Any]] = {}
+        self._ask_due_s = self._look_due_s = self._detail_due_s = 0.0
+        self.detail = ""
+        sockets = [source.socket for source in self._sources.values()] + [offer.socket for offer in self._offers]
+        sockets += [request.socket for request in self._each_request()]
+        for socket in [*sockets, *([self._answers.socket] if self._answers else [])]:
+            self._poller.register(socket, zmq.POLLIN)
+
+    def __enter__(self) -> Relay:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for source in self._sources.values():
+            source.subscriber.close()
+        for publisher in self._publishers.values():
+            publisher.close()
+        for socket in self._members.values():
+            socket.close(linger=200)
+        if self._answers is not None:
+            self._answers.close()
+        for request in self._each_request():
+            request.close()
+        for offer in self._offers:
+            offer.close()
+        self._opened.close()
+
+    @property
+    def trouble(self) -> str:
+        """Which links are down; "" if none is."""
+        down = [host for host, (request, _) in self._requests.items() if not request.is_up]
+        return f"no link to {', '.join(down)}" if down else ""
+
+    def _links(self) -> str:
+        rejected = self._gate.rejected + sum(offer.rejected for offer in self._offers)
+        rejected += sum(request.rejected for request in self._each_request())
+        links = [f"{host}: {_milliseconds(data.round_trip_s)}" for host, (data, _) in sorted(self._requests.items())]
+        more = [f"{rejected} rejected"] if rejected else []
+        blocked = sum(offer.blocked for offer in self._offers)
+        return ", ".join([*links, *more, *([f"{blocked} lost on a slow link"] if blocked else [])])
+
+    def step(self) -> None:
+        """Waits for something to forward, at most 20 ms, and forwards all that there is."""
+        now_s = time.monotonic()
+        if now_s >= self._ask_due_s:
+            self._ask_due_s = now_s + BEAT_S
+            for request in self._each_request():
+                request.ask()
+        if now_s >= self._look_due_s:
+            self._look_due_s = now_s + _LOOK_S
+            self._look_after()
+        ready = {socket for socket, _ in self._poller.poll(_POLL_MS)}
+        for publisher in self._publishers.values():
+            if publisher.socket in ready:
+                publisher.serve()
+        for source in self._sources.values():
+            for envelope, payload in source.messages() if source.socket in ready else ():
+                self._send_all(source, envelope, payload)
+        for offer in self._offers:
+            for asker, kind, frames, new in offer.requests() if offer.socket in ready else ():
+                if kind == DONE and len(frames) == 2:
+                    self._answer(frames)
+                elif kind == TAKEN and frames:
+                    self._taken(offer, asker, frames[0].decode("utf-8", "replace"))
+                for name in sorted(new):
+                    self._greet(offer, asker, self._sources[name])
+        for host, requests in self._requests.items():
+            for request in requests:
+                for name, header, payload in request.messages() if request.socket in ready else ():
+                    self._publish(request, host, name, header, payload)
+        if self._answers is not None and self._settings.clock_from is not None:
+            for header, payload in self._answers.collect():
+                self._requests[self._settings.clock_from][0].send(DONE, header, payload)
+
+    def _each_request(self) -> list[Request]:
+        return [request for pair in self._requests.values() for request in pair]
+
+    def _look_after(self) -> None:
+        if time.monotonic() >= self._detail_due_s:
+            self._detail_due_s, self.detail = time.monotonic() + 1.0, self._links()
+        for source in self._sources.values():
+            before = source.socket
+            if source.subscriber.revive():
+                self._poller.unregister(before)
+                self._poller.register(source.socket, zmq.POLLIN)
+        for publisher in self._publishers.values():
+            publisher.foreign.look()
+        for offer in self._offers:
+            offer.foreign.look()
+            offer.forget_silent()
+
+    # -- what others want ---------------------------------------------------------------------------------------------
+
+    def _offer_of(self, topic: Topic) -> Offer:
+        return self._offers[topic.is_image]
+
+    def _send_all(self, source: _Source, envelope: Envelope, payload: bytes) -> None:
+        offer, is_image = self._offer_of(source.topic), source.topic.is_image and not envelope.is_welcome
+        frames = [source.frame + pack(envelope, payload), payload]
+        for identity, asker in list(offer.askers.items()):
+            if source.name not in asker.wanted:
+                continue
+            if is_image and asker.under_way[source.name] >= UNDER_WAY:
+                asker.waiting[source.name] = frames  # the one that waited is no longer the latest
+            elif offer.send(identity, MESSAGE, *frames):
+                asker.under_way[source.name] += is_image
+
+    def _taken(self, offer: Offer, asker: Asker, name: str) -> None:
+        asker.under_way[name] = max(0, asker.under_way[name] - 1)
+        identity = next((one for one, other in offer.askers.items() if other is asker), None)
+        if name in asker.waiting and identity is not None:
+            asker.under_way[name] += offer.send(identity, MESSAGE, *asker.waiting.pop(name))
+
+    def _greet(self, offer: Offer, asker: Asker, source: _Source) -> None:
+        """A host that asks anew gets the state of the topic: from where on to count, and the last value."""
+        state = source.state()
+        identity = next((one for one, other in offer.askers.items() if other is asker), None)
+        if state is not None and identity is not None:
+            envelope, payload = state
+            offer.send(identity, MESSAGE, source.frame + pack(envelope, payload), payload)
+
+    def _answer(self, frames: list[bytes]) -> None:
+        """A member on another host has answered a tick: this process stands for it at the simulator's."""
+        header, payload = frames
+        try:
+            envelope = unpack(header, payload, schema_hash(TickDone), MAX_ANSWER_BYTES)
+            answer = TickDone.FromString(payload)
+        except (RejectedError, DecodeError) as error:
+            _log.warning("lockstep: answer from another host rejected: %s", error)
+            return
+        answer.watched_pid = os.getpid()
+        payload = answer.SerializeToString()
+        if answer.node not in self._members:
+            socket: zmq.Socket[Any] = self._here.socket(zmq.DEALER)
+            socket.setsockopt(zmq.IDENTITY, answer.node.encode())
+            socket.setsockopt(zmq.RECONNECT_IVL, 20)
+            socket.connect(f"ipc://{socket_path(self._bus.settings.folder, SERVICE)}")
+            self._members[answer.node] = socket
+        with contextlib.suppress(zmq.Again):
+            self._members[answer.node].send_multipart([pack(envelope, payload), payload], zmq.NOBLOCK)
+
+    # -- what others give ---------------------------------------------------------------------------------------------
+
+    def _publish(self, request: Request, host: str, name: str, header: bytes, payload: bytes) -> None:
+        topic = self._topics[name]
+        try:
+            envelope = unpack(header, payload, schema_hash(topic.type), topic.max_bytes)
+        except RejectedError as error:
+            request.rejected += 1
+            _log.warning("topic %s: message from %s rejected: %s", name, host, error)
+            return
+        if topic.is_image and not envelope.is_welcome:
+            request.send(TAKEN, name.encode())
+        if name not in self._publishers:
+            publisher = Publisher(self._here, self._bus.settings.folder, topic, self._bus.node, name)
+            self._owned.callback(publisher.ownership.release)
+            self._publishers[name] = publisher
+            self._poller.register(publisher.socket, zmq.POLLIN)
+        self._publishers[name].forward(envelope._replace(flags=envelope.flags & ~FLAG_RING), payload)
+
+
+def _milliseconds(round_trip_s: float) -> str:
+    """In whole milliseconds, so that a status does not change all the time."""
+    if not math.isfinite(round_trip_s):
+        return "no reply yet"
+    return f"replies within {math.ceil(1e3 * round_trip_s)} ms"
+
+
+class _Source:
+    """One topic of this host, as it is published."""
+
+    def __init__(self, context: zmq.Context[Any], folder: Any, topic: Topic, name: str) -> None:
+        self.topic, self.name = topic, name
+        self.frame = name.encode() + b"\0"
+        self.subscriber = Subscriber(context, folder, topic, name)
+        self._known: tuple[int | None, int] = (None, 0)
+        self._last: tuple[Envelope, bytes] | None = None
+
+    @property
+    def socket(self) -> zmq.Socket[Any]:
+        """Of the subscriber; another one after it was revived."""
+        return self.subscriber.socket
+
+    def messages(self) -> list[tuple[Envelope, bytes]]:
+        """What has come in; a welcome where only that has shown how far the publisher is."""
+        found = []
+        while (raw := self.subscriber.receive_raw()) is not None:
+            envelope, payload = raw
+            envelope = envelope._replace(flags=envelope.flags & ~FLAG_RING)
+            self._known = (envelope.epoch, envelope.sequence)
+            self._last = (envelope, payload) if self.topic.profile is Profile.LATCHED else None
+            found.append((envelope, payload))
+        counter = self.subscriber.counter
+        if (counter.epoch, counter.sequence) != self._known:
+            self._known, self._last = (counter.epoch, counter.sequence), None
+            if (state := self.state()) is not None:
+                found.append(state)
+        return found
+
+    def state(self) -> tuple[Envelope, bytes] | None:
+        """The welcome for a new subscriber; None while the publisher is not known."""
+        epoch, sequence = self._known
+        if epoch is None:
+            return None
+        if self._last is not None:
+            envelope, payload = self._last
+            return envelope._replace(flags=FLAG_WELCOME | FLAG_LAST_VALUE), payload
+        return Envelope(schema_hash(self.topic.type), 0, epoch, sequence, 0, 0, flags=FLAG_WELCOME), b""
+
+
+class _Answers:
+    """Answers of this host's members of lockstep, whose simulator runs on another host."""
+
+    def __init__(self, context: zmq.Context[Any], bus: Bus) -> None:
+        path = socket_path(bus.settings.folder, SERVICE)
+        self._ownership = Ownership(path, bus.node)
+        self.socket: zmq.Socket[Any] = context.socket(zmq.ROUTER)
+        self.socket.setsockopt(zmq.ROUTER_HANDOVER, 1)
+        self.socket.setsockopt(zmq.MAXMSGSIZE, MAX_ANSWER_BYTES)
+        self.socket.bind(f"ipc://{path}")
+        self._pidfds: dict[str, tuple[int, int]] = {}
+
+    def collect(self) -> list[tuple[bytes, bytes]]:
+        """Header and answer of each, and a farewell for a member that has ended without one."""
+        found = []
+        while can_read(self.socket):
+            frames = self.socket.recv_multipart(zmq.NOBLOCK)
+            if len(frames) == 3 and len(frames[1]) == SIZE:
+                self._follow(frames[2])
+                found.append((frames[1], frames[2]))
+        return found + [self._farewell(node) for node in list(self._pidfds) if self._has_ended(node)]
+
+    def _follow(self, payload: bytes) -> None:
+        with contextlib.suppress(DecodeError, OSError):
+            answer = TickDone.FromString(payload)
+            if answer.kind == TickDone.KIND_JOIN:
+                self._forget(answer.node)
+                self._pidfds[answer.node] = (answer.pid, os.pidfd_open(answer.pid))
+            elif answer.kind == TickDone.KIND_LEAVE:
+                self._forget(answer.node)
+
+    def _has_ended(self, node: str) -> bool:
+        poller = zmq.Poller()
+        poller.register(self._pidfds[node][1], zmq.POLLIN)
+        return bool(poller.poll(0))
+
+    def _farewell(self, node: str) -> tuple[bytes, bytes]:
+        pid = self._pidfds[node][0]
+        self._forget(node)
+        mark = TopicMark(topic=member_mark(node), epoch=pid, sequence=0)
+        payload = TickDone(node=node, pid=pid, kind=TickDone.KIND_LEAVE, published=[mark]).SerializeToString()
+        return pack(Envelope(schema_hash(TickDone), 0, 0, 0, 0, 0), payload), payload
+
+    def _forget(self, node: str) -> None:
+        if node in self._pidfds:
+            os.close(self._pidfds.pop(node)[1])
+
+    def close(self) -> None:
+        """Closes the socket, and gives its path up."""
+        for node in list(self._pidfds):
+            self._forget(node)
+        self.socket.close(linger=0)
+        self._ownership.release()

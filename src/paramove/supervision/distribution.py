@@ -1,0 +1,182 @@
+"""Nodes on several hosts: what crosses between them, and the relays that forward it."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import socket
+import subprocess
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from paramove.bus import CLOCK, Topic, topics
+from paramove.documents import DocumentError, InputError, nearest
+from paramove.hosts import HostKeys, Peer
+from paramove.supervision.interfaces import Interface
+from paramove.supervision.launch_file import Launch
+from paramove.supervision.launch_schema import HostSettings, LaunchFile, NodeSettings
+
+SSH = ("ssh", "-o", "BatchMode=yes", "-o", "ConnectTimeout=10", "-o", "ServerAliveInterval=1")
+"""The person's own ssh, with keys and configuration; never asks for a password, as no terminal waits for it."""
+STAYS = ("wire/", "truth/")
+"""Topics that connect a robot, or the truth about it, with the process that drives or judges it: on one host."""
+
+Crossing = dict[tuple[str, str], dict[str, str]]
+"""(from, to) -> name on the bus -> row of the table of topics."""
+
+
+def ssh_command(host: HostSettings, *words: str) -> list[str]:
+    """What runs a command of paramove on a host. The variable PARAMOVE_SSH takes the place of ssh and its options."""
+    program = os.environ.get("PARAMOVE_SSH")
+    there = f"{host.command} {shlex.join(words)}"
+    if host.folder is not None:
+        there = f"cd {shlex.quote(host.folder)} && {there}"
+    assert host.ssh is not None
+    return [*(shlex.split(program) if program else SSH), host.ssh, there]
+
+
+def on_bus(launch: Launch, node: str, topic: Topic) -> str:
+    """Name on the bus of a topic of a node, after its remaps."""
+    return launch.file.nodes[node].remaps.get(topic.name, topic.name)
+
+
+def own_host(file: LaunchFile) -> str | None:
+    """Name of the host that the launcher runs on; None where the file has no hosts."""
+    return next((name for name, host in file.hosts.items() if host.ssh is None), None)
+
+
+def crossing(launch: Launch, interfaces: Mapping[str, Interface]) -> Crossing:
+    """Which topics cross from which host to which.
+
+    The status of each node, and what nobody on the bus publishes but a person's terminal, cross to and from the
+    launcher's host.
+    """
+    own = own_host(launch.file) or ""
+    host = {name: node.host or own for name, node in launch.file.nodes.items()}
+    publisher = {on_bus(launch, name, topic): host[name] for name, its in interfaces.items() for topic in its.publishes}
+    found: Crossing = defaultdict(dict)
+    for name, interface in interfaces.items():
+        for topic in interface.subscribes:
+            subscribed = on_bus(launch, name, topic)
+            here = publisher.get(subscribed, own)
+            if here != host[name]:
+                found[here, host[name]][subscribed] = topic.name
+        if CLOCK in interface.publishes:
+            for other in {*host.values()} - {host[name]}:
+                found[host[name], other][CLOCK.name] = CLOCK.name
+        if host[name] != own:
+            status = topics.status(name).name
+            found[host[name], own][status] = status
+    return dict(found)
+
+
+def wrong_hosts(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
+    """Errors of hosts, and of topics that must not cross."""
+    file = launch.file
+    for name, node in file.nodes.items():
+        if node.host is not None and node.host not in file.hosts:
+            known = f"; {nearest(node.host, file.hosts)}" if file.hosts else ": the launch file has no hosts"
+            yield launch.error(("nodes", name, "host"), f"there is no host '{node.host}'{known}")
+            return
+    if not file.hosts:
+        return
+    own = [name for name, host in file.hosts.items() if host.ssh is None]
+    if len(own) != 1:
+        found = ", ".join(own) or "none"
+        yield launch.error(("hosts",), f"one host without `ssh` expected, that of the launcher; found {found}")
+        return
+    if not file.bus.lockstep:
+        message = "hosts need 'bus: {clock: simulated, lockstep: true}': their clocks are not compared yet"
+        yield launch.error(("hosts",), message)
+    for (here, there), names in crossing(launch, interfaces).items():
+        for name in names:
+            if name.startswith(STAYS):
+                yield launch.error(("hosts",), f"{name} would cross from {here} to {there}: its nodes need one host")
+
+
+def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostKeys | None = None) -> Launch:
+    """The launch file with a relay for each host, and nodes of the launcher's host without a host.
+
+    Raises InputError for a host that is not trusted or not found.
+    """
+    file, own = launch.file, own_host(launch.file)
+    if own is None:
+        return launch
+    keys = keys or HostKeys()
+    trusted = keys.trusted()
+    peers, crosses = {}, crossing(launch, interfaces)
+    for name, host in file.hosts.items():
+        if host.ssh is not None and host.ssh not in trusted:
+            raise InputError(f"{host.ssh} is not trusted yet: paramove host trust {host.ssh}")
+        key = keys.own().public if host.ssh is None else trusted[host.ssh]
+        peers[name] = Peer(address=host.address or _address(name, file.hosts), port=host.port, key=key)
+    nodes = {
+        name: node.model_copy(update={"host": None if node.host == own else node.host})
+        for name, node in file.nodes.items()
+    }
+    clock = next((nodes[name].host or own for name, its in interfaces.items() if CLOCK in its.publishes), own)
+    for name, host in file.hosts.items():
+        others = {
+            other: peer.model_copy(
+                update={"wants": crosses.get((name, other), {}), "gives": crosses.get((other, name), {})}
+            )
+            for other, peer in peers.items()
+            if crosses.get((name, other)) or crosses.get((other, name))
+        }
+        if not others:
+            continue
+        relay = f"relay_{name}"
+        if name != own:  # as of every other node there
+            status = topics.status(relay).name
+            others[own] = others[own].model_copy(update={"wants": {**others[own].wants, status: status}})
+        parameters = {"address": peers[name].address, "port": host.port, "peers": others}
+        if name != clock:
+            parameters["clock_from"] = clock
+        nodes[relay] = NodeSettings(
+            module="nodes.relay",
+            parameters={key: _plain(value) for key, value in parameters.items()},
+            host=None if name == own else name,
+            lockstep=False,
+            restart="on-failure",
+            stop="last",
+        )
+    own_peers = nodes[f"relay_{own}"].parameters["peers"]
+    for name in own_peers:
+        status = topics.status(f"relay_{name}").name
+        own_peers[name]["gives"][status] = status
+    return replace(launch, file=file.model_copy(update={"nodes": nodes}))
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: one.model_dump(mode="json") if isinstance(one, Peer) else one for key, one in value.items()}
+    return value
+
+
+def _address(name: str, hosts: Mapping[str, HostSettings]) -> str:
+    """Of a host as others reach it: as ssh resolves its name; of this one, as it reaches the others."""
+    host = hosts[name]
+    if host.ssh is not None:
+        return _resolved(host.ssh)
+    others = [one.address or _resolved(one.ssh) for one in hosts.values() if one.ssh is not None]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect((others[0] if others else "127.0.0.1", 9))
+        except OSError as error:
+            raise InputError(f"{others[0]} cannot be reached: {error.strerror}; give hosts.{name}.address") from error
+        return str(probe.getsockname()[0])
+
+
+def _resolved(ssh: str) -> str:
+    lines: Sequence[str] = ()
+    try:
+        answer = subprocess.run(["ssh", "-G", ssh], capture_output=True, text=True, timeout=10, check=False)
+        lines = answer.stdout.splitlines()
+    except (OSError, subprocess.TimeoutExpired):
+        pass
+    name = next((line.split()[1] for line in lines if line.startswith("hostname ")), ssh)
+    try:
+        return socket.gethostbyname(name)
+    except OSError as error:
+        raise InputError(f"{name} is not found ({error}); correct ~/.ssh/config, or give the host's address") from error

@@ -1,0 +1,182 @@
+"""Nodes on another host: processes that its agent starts, ends and watches."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import subprocess
+import time
+from typing import Any
+
+from paramove.documents import InputError
+from paramove.supervision.agent import ALIVE_S, SILENT_S, Lines
+from paramove.supervision.distribution import ssh_command
+from paramove.supervision.launch_schema import HostSettings
+from paramove.supervision.run_folder import RunFolder
+
+BEGIN_S = 60.0
+"""For ssh, and for the agent to begin: a first start reads the whole installation from a slow disk."""
+START_S = 10.0
+LOST = 255
+"""Exit code of a node whose host can no longer be reached, as ssh has it."""
+
+
+class RemoteHost:
+    """The launcher's end of an agent, while it is a context. Waits for the agent to be ready.
+
+    Args:
+        name: Of the host in the launch file.
+        settings: How it is reached.
+        begin: What the agent is told: see `agent.py`.
+        folder: Of the run here; the output of the nodes there is appended to its logs.
+
+    Raises:
+        InputError: It is not reached, or rejects the run.
+
+    Attributes:
+        lost: Why it is not connected; "" while it is.
+    """
+
+    def __init__(self, name: str, settings: HostSettings, begin: dict[str, Any], folder: RunFolder) -> None:
+        self.name, self.lost = name, ""
+        self._folder = folder
+        self._processes: dict[str, RemoteProcess] = {}
+        self._answers: dict[str, dict[str, Any]] = {}
+        self._process = subprocess.Popen(
+            ssh_command(settings, "host", "agent"),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=folder.log(f"agent_{name}").open("ab"),
+            start_new_session=True,  # Ctrl-C is for the launcher alone
+        )
+        assert self._process.stdout is not None
+        self._lines = Lines(self._process.stdout.fileno())
+        self._heard_s = self._alive_due_s = time.monotonic()
+        self.send(begin={**begin, "host": name})
+        end_s = time.monotonic() + BEGIN_S
+        while "ready" not in self._answers and not self.lost and time.monotonic() < end_s:
+            select.select([self.descriptor], [], [], ALIVE_S)
+            self._heard_s = time.monotonic()
+            self.serve()
+        if "ready" not in self._answers:
+            self.close()
+            why = self._answers.get("rejected", {}).get("rejected") or self.lost or f"no answer within {BEGIN_S:g} s"
+            raise InputError(f"{name} ({settings.ssh}) does not take part: {why}; see {folder.log(f'agent_{name}')}")
+
+    @property
+    def descriptor(self) -> int:
+        """Readable when the agent has reported something."""
+        return self._lines.descriptor
+
+    def serve(self) -> None:
+        """Reads what the agent has reported, and shows it that the launcher is alive; to be called often."""
+        now_s = time.monotonic()
+        for line in self._lines.read():
+            self._heard_s = now_s
+            self._take(line)
+        if not self.lost and (self._lines.ended or now_s - self._heard_s > SILENT_S):
+            self.lost = "its agent has ended" if self._lines.ended else f"it is silent for {SILENT_S:g} s"
+            for process in self._processes.values():
+                process.has_ended(LOST)
+            self._processes.clear()
+        if not self.lost and now_s >= self._alive_due_s:
+            self._alive_due_s = now_s + ALIVE_S
+            self.send()
+
+    def start(self, node: str, nice: int) -> RemoteProcess:
+        """Starts a node's process there. Raises OSError if that fails."""
+        self._answers.pop(node, None)
+        self.send(start=node, nice=nice)
+        end_s = time.monotonic() + START_S
+        while node not in self._answers and not self.lost and time.monotonic() < end_s:
+            select.select([self.descriptor], [], [], ALIVE_S)
+            self.serve()
+        answer = self._answers.get(node, {})
+        if "pid" not in answer:
+            raise OSError(0, f"{self.name}: {answer.get('reason') or self.lost or f'no answer within {START_S:g} s'}")
+        process = RemoteProcess(self, node, int(answer["pid"]))
+        self._processes[node] = process
+        return process
+
+    def send(self, **content: Any) -> None:
+        """Sends one line."""
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):  # `serve` notices that it has gone
+            self._process.stdin.write(json.dumps(content).encode() + b"\n")
+            self._process.stdin.flush()
+
+    def close(self) -> None:
+        """Ends the agent, which ends what is left there."""
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+        try:
+            self._process.wait(timeout=SILENT_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _take(self, line: dict[str, Any]) -> None:
+        for word in ("ready", "rejected"):
+            if word in line:
+                self._answers[word] = line
+        for word in ("started", "failed"):
+            if word in line:
+                self._answers[str(line[word])] = line
+        if "log" in line and line["log"] in self._folder_names():
+            with self._folder.log(line["log"]).open("a", encoding="utf-8") as file:
+                file.write(str(line.get("text", "")))
+        process = self._processes.get(str(line.get("ended", line.get("halted", ""))))
+        if process is not None and "ended" in line:
+            del self._processes[process.node]
+            process.has_ended(int(line["code"]))
+        elif process is not None:
+            process.is_halted = bool(line["is"])
+
+    def _folder_names(self) -> set[str]:
+        return {*self._processes, *self._answers}
+
+
+class RemoteProcess:
+    """A node's process on another host; see `NodeProcess`."""
+
+    def __init__(self, host: RemoteHost, node: str, pid: int) -> None:
+        self.node, self.pid = node, pid
+        self.pidfd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self.is_halted: bool | None = None
+        self._host = host
+        self._code: int | None = None
+
+    def prioritise(self, nice: int) -> None:
+        """Its agent has done that."""
+
+    def has_ended(self, code: int) -> None:
+        """The agent reports its end."""
+        self._code = code
+        os.eventfd_write(self.pidfd, 1)
+
+    def ended(self) -> int | None:
+        """See `SupervisedProcess.ended`."""
+        if self._code is not None and self.pidfd >= 0:
+            os.close(self.pidfd)
+            self.pidfd = -1
+        return self._code
+
+    def halted(self) -> bool | None:
+        """See `SupervisedProcess.halted`."""
+        halted, self.is_halted = self.is_halted, None
+        return halted
+
+    def memory_mb(self) -> float:
+        """Is not measured from here."""
+        return 0.0
+
+    def terminate(self) -> None:
+        """See `SupervisedProcess.terminate`."""
+        self._host.send(end=self.node)
+
+    def kill(self) -> None:
+        """See `SupervisedProcess.kill`."""
+        self._host.send(kill=self.node)

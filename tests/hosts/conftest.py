@@ -1,0 +1,104 @@
+"""Two hosts in one process: two bus folders, two key folders, and the loopback between them."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from paramove.bus import Bus, BusSettings, BusVisitor, topics
+from paramove.bus.topics import Topic
+from paramove.hosts import HostKeys, Peer, Relay, RelaySettings
+
+
+def free_ports() -> int:
+    """A port that is free with the next one."""
+    while True:
+        with socket.socket() as one, socket.socket() as next_one:
+            one.bind(("127.0.0.1", 0))
+            port = int(one.getsockname()[1])
+            with contextlib.suppress(OSError, OverflowError):
+                next_one.bind(("127.0.0.1", port + 1))
+                return port
+
+
+class TwoHosts:
+    """`here` gives the topics of `gives`, `there` those of `back`; each has a folder of the bus and one of keys."""
+
+    def __init__(self, root: Path, gives: tuple[Topic, ...], back: tuple[Topic, ...] = ()) -> None:
+        self._opened = contextlib.ExitStack()
+        self.folders = {
+            name: Path(self._opened.enter_context(tempfile.TemporaryDirectory())) for name in ("here", "there")
+        }
+        self.keys = {name: HostKeys(root / name) for name in self.folders}
+        self.ports = {name: free_ports() for name in self.folders}
+        crossing = {"here": gives, "there": back}
+        self.relays: dict[str, Relay] = {}
+        self.settings: dict[str, RelaySettings] = {}
+        self._running: dict[str, contextlib.ExitStack] = {}
+        for name, other in (("here", "there"), ("there", "here")):
+            self.keys[name].trust(other, self.keys[other].own().public)
+            rows = [{one.name: one.name for one in crossing[side]} for side in (name, other)]
+            peer = Peer(
+                address="127.0.0.1",
+                port=self.ports[other],
+                key=self.keys[other].own().public,
+                wants=rows[0],
+                gives=rows[1],
+            )
+            self.settings[name] = RelaySettings(
+                address="127.0.0.1", port=self.ports[name], peers={other: peer}, keys=self.keys[name].folder
+            )
+
+    def start(self, *names: str) -> None:
+        """Starts the relays of these hosts, of both by default."""
+        for name in names or self.folders:
+            self._running[name] = self._opened.enter_context(contextlib.ExitStack())
+            bus = Bus(f"relay_{name}", BusSettings(folder=self.folders[name]))
+            self._running[name].callback(bus.close)
+            self.relays[name] = self._running[name].enter_context(Relay(bus, self.settings[name]))
+
+    def stop(self, name: str) -> None:
+        """Ends a host's relay."""
+        del self.relays[name]
+        self._running[name].close()
+
+    def visitor(self, name: str) -> BusVisitor:
+        """Sockets on a host's bus."""
+        return self._opened.enter_context(BusVisitor(self.folders[name], "a test"))
+
+    def until(
+        self, condition: Callable[[], Any], *also: Callable[[], Any], only: str = "", seconds: float = 60.0
+    ) -> Any:
+        """Lets the relays, or one of them only, work until the condition is true; returns what it gave."""
+        end_s = time.monotonic() + seconds
+        while time.monotonic() < end_s:
+            for name, relay in self.relays.items():
+                if only in ("", name):
+                    relay.step()
+            for call in also:
+                call()
+            if found := condition():
+                return found
+        raise AssertionError(f"not within {seconds} s: {condition}")
+
+    def close(self) -> None:
+        self._opened.close()
+
+
+@pytest.fixture
+def two_hosts(tmp_path: Path) -> Iterator[Callable[..., TwoHosts]]:
+    with contextlib.ExitStack() as opened:
+
+        def make(gives: tuple[Topic, ...], back: tuple[Topic, ...] = (topics.RULES,)) -> TwoHosts:
+            hosts = TwoHosts(tmp_path, gives, back)
+            opened.callback(hosts.close)
+            return hosts
+
+        yield make

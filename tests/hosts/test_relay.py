@@ -1,0 +1,179 @@
+"""Topics from one host to another: the very same messages, counted as on one host."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+
+from paramove.bus import topics
+from paramove.hosts import HostKeyError
+from paramove.msgs.rule_pb2 import Rule, Rules, Speech
+
+
+def test_messages_arrive_as_they_were_published_each_once(two_hosts):
+    hosts = two_hosts((topics.SPEECH,))
+    published = hosts.visitor("here").publisher(topics.SPEECH)
+    subscriber = hosts.visitor("there").subscriber(topics.SPEECH)
+    hosts.start()
+    hosts.until(lambda: subscriber.welcomed, subscriber.receive, published.serve)
+    received = []
+
+    def receive():
+        while (one := subscriber.receive()) is not None:
+            received.append(one)
+
+    for number in range(200):
+        published.publish(Speech(text=str(number)), 10 * number, 10 * number + 1)
+    hosts.until(lambda: len(received) == 200, receive)
+    assert [one.message.text for one in received] == [str(number) for number in range(200)]
+    assert [(one.sequence, one.captured_ns, one.published_ns) for one in received] == [
+        (number + 1, 10 * number, 10 * number + 1) for number in range(200)
+    ]
+    counter = subscriber.counter
+    assert (counter.lost, counter.repeated, counter.rejected.total()) == (0, 0, 0)
+    assert counter.epoch == published.epoch
+
+
+def test_a_latched_topic_is_there_for_who_comes_late_whichever_came_first(two_hosts):
+    hosts = two_hosts((topics.RULES,), ())
+    published = hosts.visitor("here").publisher(topics.RULES)
+    published.publish(Rules(rules=[Rule(object="blue")]), 1, 1)
+    hosts.start("here")
+    hosts.until(lambda: True, published.serve)
+    hosts.start("there")
+    subscriber = hosts.visitor("there").subscriber(topics.RULES)
+    received = hosts.until(subscriber.receive, published.serve)
+    assert received.message.rules[0].object == "blue"
+    assert subscriber.counter.lost == 0
+
+
+def test_a_restarted_publisher_is_a_new_epoch_and_no_loss(two_hosts):
+    hosts = two_hosts((topics.SPEECH,))
+    subscriber = hosts.visitor("there").subscriber(topics.SPEECH)
+    hosts.start()
+    for start in range(3):
+        with hosts.visitor("here") as visitor:
+            published = visitor.publisher(topics.SPEECH)
+            hosts.until(lambda: subscriber.counter.epoch == published.epoch, subscriber.receive, published.serve)  # noqa: B023
+            published.publish(Speech(text=str(start)), 1, 1)
+            assert hosts.until(subscriber.receive).message.text == str(start)
+    assert (subscriber.counter.epochs, subscriber.counter.lost) == (3, 0)
+
+
+def test_images_cross_too_and_only_the_latest_waits_for_a_slow_reader(two_hosts):
+    hosts = two_hosts((topics.CAMERA_IMAGE_RAW,))
+    published = hosts.visitor("here").publisher(topics.CAMERA_IMAGE_RAW)
+    subscriber = hosts.visitor("there").subscriber(topics.CAMERA_IMAGE_RAW)
+    hosts.start()
+    hosts.until(lambda: subscriber.welcomed, subscriber.receive, published.serve)
+    pixels = np.random.default_rng(0).integers(0, 256, (480, 640, 3), dtype=np.uint8).tobytes()
+    (asker,) = hosts.relays["here"]._offers[True].askers.values()
+    for number in range(1, 21):  # while the other host does nothing
+        before = (asker.under_way.total(), asker.waiting.get("camera/image_raw"))
+        published.publish(RawImage(width=number, height=480, data=pixels), 1, 1)
+        hosts.until(lambda: (asker.under_way.total(), asker.waiting.get("camera/image_raw")) != before, only="here")  # noqa: B023
+    received = []
+
+    def receive():
+        while (one := subscriber.receive()) is not None:
+            received.append(one)
+
+    hosts.until(lambda: received and received[-1].message.width == 20, receive)
+    assert [one.message.width for one in received] == [1, 2, 20]
+    assert all(one.message.data == pixels for one in received)
+    assert subscriber.counter.lost == 17
+
+
+def test_a_host_gets_and_gives_only_what_the_launch_file_lets_cross(two_hosts):
+    hosts = two_hosts((topics.SPEECH,))
+    stolen = hosts.settings["there"].peers["here"]
+    more = {**stolen.gives, topics.GESTURES.name: topics.GESTURES.name}
+    hosts.settings["there"] = hosts.settings["there"].model_copy(
+        update={"peers": {"here": stolen.model_copy(update={"gives": more})}}
+    )
+    visitor = hosts.visitor("there")
+    spoken, seen = visitor.subscriber(topics.SPEECH), visitor.subscriber(topics.GESTURES)
+    published = hosts.visitor("here").publisher(topics.SPEECH)
+    hosts.start()
+    hosts.until(lambda: spoken.welcomed, spoken.receive, published.serve)
+    hosts.until(lambda: "rejected" in hosts.relays["here"].detail, published.serve)
+    assert not seen.welcomed
+
+
+def test_what_a_trusted_host_may_not_give_is_rejected_and_counted(two_hosts):
+    """A camera's computer in other hands publishes a trajectory."""
+    hosts = two_hosts((topics.SPEECH, topics.ARM_TRAJECTORY))
+    honest = hosts.settings["there"].peers["here"]
+    hosts.settings["there"] = hosts.settings["there"].model_copy(
+        update={"peers": {"here": honest.model_copy(update={"gives": {topics.SPEECH.name: topics.SPEECH.name}})}}
+    )
+    moves = hosts.visitor("there").subscriber(topics.ARM_TRAJECTORY)
+    hosts.start()
+    here = hosts.relays["here"]
+    offer = here._offers[0]
+    hosts.until(lambda: offer.askers)
+    for identity in offer.askers:
+        offer.send(identity, b"M", b"arm/trajectory\0" + bytes(56), b"anything")
+    hosts.until(lambda: "1 rejected" in hosts.relays["there"].detail)
+    assert not moves.welcomed
+
+
+def test_another_key_gets_no_connection(two_hosts, tmp_path):
+    hosts = two_hosts((topics.SPEECH,))
+    subscriber = hosts.visitor("there").subscriber(topics.SPEECH)
+    (hosts.keys["there"].folder / "own.key").unlink()  # it was set up anew, and is not trusted again
+    published = hosts.visitor("here").publisher(topics.SPEECH)
+    hosts.start()
+    hosts.until(lambda: "rejected" in hosts.relays["here"].detail, published.serve)
+    assert not subscriber.welcomed
+    assert hosts.relays["there"].trouble == "no link to here"
+
+
+def test_a_host_whose_key_is_not_trusted_is_no_peer(two_hosts):
+    hosts = two_hosts((topics.SPEECH,))
+    (hosts.keys["here"].folder / "trusted").unlink()
+    with pytest.raises(HostKeyError, match="there"):
+        hosts.start("here")
+
+
+def test_garbage_and_a_thousand_connections_at_the_port_change_nothing(two_hosts):
+    hosts = two_hosts((topics.SPEECH,))
+    published = hosts.visitor("here").publisher(topics.SPEECH)
+    subscriber = hosts.visitor("there").subscriber(topics.SPEECH)
+    hosts.start()
+    hosts.until(lambda: subscriber.welcomed, subscriber.receive, published.serve)
+    draw = np.random.default_rng(0)
+    with contextlib.ExitStack() as opened:
+        for number in range(1000):
+            one = opened.enter_context(socket.socket())
+            one.connect(("127.0.0.1", hosts.ports["here"] + number % 2))
+            with contextlib.suppress(OSError):  # it was ended already
+                one.send(draw.bytes(int(draw.integers(1, 200))) if number % 3 else b"GET / HTTP/1.1\r\n\r\n")
+            if number % 100 == 0:
+                published.publish(Speech(text=str(number)), 1, 1)
+                assert hosts.until(subscriber.receive).message.text == str(number)
+        foreign = [offer.foreign for offer in hosts.relays["here"]._offers]
+        hosts.until(lambda: sum(one.count for one in foreign) >= 900)
+    assert subscriber.counter.lost == 0
+
+
+def test_a_link_that_was_cut_is_reported_and_made_anew(two_hosts):
+    hosts = two_hosts((topics.RULES,), ())
+    published = hosts.visitor("here").publisher(topics.RULES)
+    subscriber = hosts.visitor("there").subscriber(topics.RULES)
+    hosts.start()
+    published.publish(Rules(rules=[Rule(object="blue")]), 1, 1)
+    hosts.until(subscriber.receive, published.serve)
+    hosts.stop("here")
+    hosts.until(lambda: hosts.relays["there"].trouble == "no link to here")
+    published.publish(Rules(rules=[Rule(object="green")]), 2, 2)
+    published.publish(Rules(rules=[Rule(object="yellow")]), 3, 3)
+    hosts.start("here")
+    received = hosts.until(subscriber.receive, published.serve)
+    assert received.message.rules[0].object == "yellow"
+    assert (subscriber.counter.messages, subscriber.counter.lost) == (2, 1)
+    hosts.until(lambda: not hosts.relays["there"].trouble)
