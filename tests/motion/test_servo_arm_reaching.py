@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,7 +12,7 @@ from paramove.motion.clearance import MAX_STANDING, ClearanceChecker, UprightCyl
 from paramove.motion.planned_motion import PlannedMotion, RestPose
 from paramove.motion.plans import Grasp, NoPlanError
 from paramove.motion.servo_arm_reaching import FINGER_GAP_M, ServoArmReaching
-from paramove.robots.description import DescriptionError
+from paramove.robots.description import DescriptionError, RobotDescription
 from paramove.robots.planar_arm import OutOfReachError
 from paramove.safety.trajectory_check import check_trajectory
 from tests.motion.reaching import HOAP3, reaching_model
@@ -232,6 +235,34 @@ def test_an_arm_without_roll_takes_a_block_that_fits_between_its_fingers_as_it_s
         plan.fetch(source, grasp=Grasp(width=0.045, turn=np.deg2rad(45.0)))
     with pytest.raises(NoPlanError, match="60 mm wide"):
         plan.fetch(source, grasp=Grasp(width=0.030, turn=np.deg2rad(90.0), length=0.060))
+
+
+STRETCHED = {
+    "open_manipulator_x.xml": {
+        'name="joint3" axis="0 1 0" range="-1.499': 'name="joint3" axis="0 1 0" range="-2.27',
+        'name="joint4" axis="0 1 0" range="-1.699950691 1.968': 'name="joint4" axis="0 1 0" range="-2.0 2.2',
+    },
+    "robot.yaml": {
+        "servo_id: 13, motor: xm430_w350, lower_deg: -85.9": "servo_id: 13, motor: xm430_w350, lower_deg: -130",
+        "lower_deg: -97.4, upper_deg: 112.8": "lower_deg: -114, upper_deg: 126",
+    },
+}
+
+
+def test_an_elbow_that_can_pass_the_stretched_arm_stays_on_its_side(tmp_path: Path) -> None:
+    """Otherwise a far position would be reached with the elbow below, and no path leads there."""
+    folder = tmp_path / "open_manipulator_x"
+    shutil.copytree(description("open_manipulator_x").model_path.parent, folder)
+    for name, changes in STRETCHED.items():
+        text = (folder / name).read_text(encoding="utf-8")
+        for old, new in changes.items():
+            assert old in text
+            text = text.replace(old, new)
+        (folder / name).write_text(text, encoding="utf-8")
+    plan, target = ServoArmReaching(RobotDescription.load(folder), reaching_model()), np.array((0.19, 0.0, 0.036))
+    for place in ((0.23, -0.08), (0.24, 0.09), (0.27, 0.09)):
+        fetch = plan.fetch(np.array((*place, 0.036)), grasp=Grasp(target))
+        plan.deliver(fetch.end, target)
 
 
 @each_arm

@@ -27,10 +27,16 @@ class HandPoses:
         chain: The arm.
         clearance: Of the table.
         gripper: Angle of the gripper for which the table is kept clear, rad.
+        base: Angles of the arm in the base pose, [J], rad: poses with the elbow on the same side come first, as the way
+            to others leads through the stretched arm.
     """
 
-    def __init__(self, chain: Chain, clearance: ClearanceChecker, gripper: float) -> None:
+    def __init__(self, chain: Chain, clearance: ClearanceChecker, gripper: float, base: Floats) -> None:
         self._chain, self._clearance, self._gripper = chain, clearance, gripper
+        arm = chain.kinematics
+        rest = arm.forward(base)
+        away = np.abs(arm.all_joint_angles(rest.position, float(rest.pitch)) - base).sum(axis=-1)
+        self._usual = 0 if np.isnan(away).all() else int(np.nanargmin(away))
 
     def pitch_at(self, target: ArrayLike, preferred: float, band: tuple[float, float]) -> float:
         """The pitch in a band, nearest to the preferred one, that reaches a position clear of the table; rad.
@@ -63,14 +69,18 @@ class HandPoses:
         return np.asarray(positions[np.isfinite(solutions).all(axis=-1).any(axis=-1).any(axis=-1)])
 
     def _poses(self, goal: Floats, preferred: float, band: tuple[float, float]) -> tuple[Floats, Floats]:
-        """Pitches in order of their distance from the preferred one, with the joint angles, [P] and [P, J]."""
+        """Pitches in order of their distance from the preferred one, with the joint angles, [P] and [P, J].
+
+        Those of the usual posture come first.
+        """
         pitches = np.unique([*np.linspace(*band, _PITCHES_A_BAND), np.clip(preferred, *band)])
         pitches = pitches[np.argsort(np.abs(pitches - preferred), kind="stable")]
         solutions = self._chain.kinematics.all_joint_angles(goal, pitches)
-        good = np.isfinite(solutions).all(axis=-1)
-        first = good.argmax(axis=-1)
-        reached = good.any(axis=-1)
-        return pitches[reached], solutions[np.arange(len(pitches)), first][reached]
+        good = np.asarray(np.isfinite(solutions).all(axis=-1))
+        usual = good[:, self._usual]
+        other = np.asarray(good.any(axis=-1)) & ~usual
+        rows = [solutions[usual, self._usual], solutions[np.flatnonzero(other), np.argmax(good[other], axis=-1)]]
+        return np.concatenate([pitches[usual], pitches[other]]), np.concatenate(rows)
 
     def _obstacle(self, row: Floats) -> str:
         """What the arm would touch in a pose; empty if nothing."""

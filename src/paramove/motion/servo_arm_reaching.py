@@ -91,7 +91,7 @@ class ServoArmReaching:
         table = WorkSurface((-_TABLE_M, _TABLE_M), (-_TABLE_M, _TABLE_M), o.table_z)
         cylinder = cylinder or UprightCylinder()
         self._clearance = ClearanceChecker(description, self.arm, table, cylinder)
-        self._poses = HandPoses(chain, self._clearance, self.arm.angle_of(o.work_opening))
+        self._poses = HandPoses(chain, self._clearance, self.arm.angle_of(o.work_opening), self.base_angles[:-1])
         length = float(np.hypot(*self._arm.upper_arm) + np.hypot(*self._arm.forearm) + self._arm.hand[0])
         ahead = self._poses.ahead(o.table_z, self._band(o.grasp_band_deg))
         self._usual_reach = float(np.quantile(ahead[:, 0], USUAL_REACH) - self._arm.yaw_axis[0])
