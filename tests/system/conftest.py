@@ -15,15 +15,25 @@ WATCHING = str(Path(__file__).parent / "overlays" / "watching.yaml")
 
 
 class Launcher:
-    """`paramove launch` in a domain and with run folders of its own."""
+    """`paramove launch` in a domain and with run folders of its own; `within` is what each command begins with."""
 
     def __init__(self, folder, runtime):
         self.folder = folder
         self.environment = os.environ | {"XDG_RUNTIME_DIR": runtime, "PARAMOVE_DOMAIN": "test"}
         self.started = []
+        self.within = ()
 
     def start(self, *arguments, **options):
-        command = [sys.executable, "-m", "paramove.cli.main", "launch", *arguments, "--runs", str(self.folder)]
+        command = [
+            *self.within,
+            sys.executable,
+            "-m",
+            "paramove.cli.main",
+            "launch",
+            *arguments,
+            "--runs",
+            str(self.folder),
+        ]
         options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, **options}
         self.started.append(subprocess.Popen(command, cwd=ROOT, env=self.environment, **options))
         return self.started[-1]

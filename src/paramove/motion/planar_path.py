@@ -67,7 +67,8 @@ def _shortest(solutions: Floats, extra: Floats, start: Floats, positions: Floats
         cost = total[np.arange(len(reachable)), origin] + offset[reachable]
         possible = np.isfinite(cost)
         if not possible.any():
-            raise NoJointPathError(f"the joints would have to jump near {_metres(positions[number])}, on the path")
+            place = _metres(positions[number])
+            raise NoJointPathError(f"the joints would have to jump near {place}, on the path, to another posture")
         origins.append((states[reachable][possible], origin[possible]))
         before, cost = states[reachable][possible], cost[possible]
     path, at = [], int(cost.argmin())
