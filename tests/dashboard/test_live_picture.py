@@ -85,7 +85,9 @@ def test_objects_are_drawn_as_they_were_seen() -> None:
     round_one = Gesture(kind=Gesture.KIND_RESTED, object="blue", width_m=0.022, height_m=0.05)
     gone = Gesture(kind=Gesture.KIND_VANISHED, object="blue")
     unknown = Gesture(kind=Gesture.KIND_RESTED, object="yellow")
-    found = sections(*((topics.GESTURES, one) for one in (block, round_one, gone, unknown)))["objects"]
+    lying = Gesture(kind=Gesture.KIND_RESTED, object="red", width_m=0.02, height_m=0.02, turn_rad=2.0, length_m=0.03)
+    found = sections(*((topics.GESTURES, one) for one in (block, round_one, gone, unknown, lying)))["objects"]
+    assert (found["red"]["state"], found["red"]["size"]["length"]) == ("lies", 0.03)
     assert found["green"]["size"] == {"width": 0.028, "height": 0.0275, "turn": 0.4, "length": 0.0}
     assert found["blue"]["size"] == {"width": 0.022, "height": 0.05, "turn": None, "length": 0.0}
     assert found["yellow"]["size"] is None

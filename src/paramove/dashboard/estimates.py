@@ -111,6 +111,8 @@ class Estimates:
             known.state = _GESTURES[gesture.kind]
             known.detected = (gesture.x, gesture.y) if gesture.located else None
             known.shape = ObjectShape.of(gesture) or known.shape
+            if known.state == "stands" and known.shape is not None and known.shape.length:
+                known.state = "lies"
             if gesture.located and known.state != "gone":
                 known.put = None  # it was detected elsewhere than where the robot put it
 
@@ -169,7 +171,9 @@ class Estimates:
 
     def _object(self, name: str) -> dict[str, Any]:
         known, rule = self._objects[name], self._rules.get(name)
-        at_rest = known.detected if known.state == "stands" and known.shape else None  # its height is accounted for
+        at_rest = (
+            known.detected if known.state in ("stands", "lies") and known.shape else None
+        )  # its height is accounted for
         position = at_rest or self._detected_now(name) or known.detected or known.put
         state = known.state
         if name == self.held:

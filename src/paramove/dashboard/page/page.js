@@ -116,7 +116,7 @@ function showRules(objects) {
     swatch.style.background = css(colourOf(name));
     first.append(swatch, name);
     cell(row, object.rule ? cm(object.rule.place) : "not learned yet", object.rule ? "" : "unknown");
-    const stands = object.state === "stands" || object.state === "moves";
+    const stands = ["stands", "lies", "moves"].includes(object.state);
     cell(row, name === state.pointed ? "pointed at" : stands && object.place ? `${object.state} at ${cm(object.place)}` : object.state);
     return row;
   }));
