@@ -10,8 +10,7 @@ import typer
 
 from paramove.documents import InputError
 from paramove.hosts import HostKeys
-from paramove.supervision.distribution import ssh_command
-from paramove.supervision.launch_schema import HostSettings
+from paramove.supervision import Agent, HostSettings, release_of, ssh_command
 from paramove.workspace import Workspace
 
 app = typer.Typer(name="host", help="Trust and check the other computers of a run.", no_args_is_help=True)
@@ -76,14 +75,10 @@ def release() -> None:
 @app.command(hidden=True)
 def agent() -> None:
     """Run this computer's nodes of a run; started by the launcher over ssh, with which it exchanges lines of JSON."""
-    from paramove.supervision.agent import Agent
-
     raise typer.Exit(0 if Agent(Workspace.here()).run() else 1)
 
 
 def _release() -> str:
-    from paramove.supervision.agent import release_of
-
     return release_of(Workspace.here())
 
 

@@ -30,6 +30,7 @@ from paramove.bus import (
     Publisher,
     RejectedError,
     Subscriber,
+    Topic,
     can_read,
     member_mark,
     pack,
@@ -38,7 +39,6 @@ from paramove.bus import (
     topics,
     unpack,
 )
-from paramove.bus.topics import Profile, Topic
 from paramove.hosts.keys import HostKeyError, HostKeys
 from paramove.hosts.link import BEAT_S, DONE, MESSAGE, TAKEN, Asker, Gatekeeper, Offer, Request
 from paramove.hosts.settings import RelaySettings
@@ -286,7 +286,7 @@ class _Source:
             envelope, payload = raw
             envelope = envelope._replace(flags=envelope.flags & ~FLAG_RING)
             self._known = (envelope.epoch, envelope.sequence)
-            self._last = (envelope, payload) if self.topic.profile is Profile.LATCHED else None
+            self._last = (envelope, payload) if self.topic.profile is topics.Profile.LATCHED else None
             found.append((envelope, payload))
         counter = self.subscriber.counter
         if (counter.epoch, counter.sequence) != self._known:

@@ -1,7 +1,10 @@
 from . import application as application
+from .agent import Agent as Agent
+from .agent import release_of as release_of
 from .application import check as check
 from .control import NoRunError as NoRunError
 from .control import ask as ask
+from .distribution import ssh_command as ssh_command
 from .domain import LONGEST_FOLDER as LONGEST_FOLDER
 from .domain import DomainError as DomainError
 from .domain import DomainNameError as DomainNameError
@@ -24,6 +27,7 @@ from .launch_file import LaunchFileMissingError as LaunchFileMissingError
 from .launch_file import load as load
 from .launch_file import overlay_folders as overlay_folders
 from .launch_schema import FILES as FILES
+from .launch_schema import HostSettings as HostSettings
 from .launch_schema import LaunchFile as LaunchFile
 from .launch_schema import editor_schema as editor_schema
 from .launch_schema import schema_as_text as schema_as_text
