@@ -96,6 +96,6 @@ def _asked(host: HostSettings, *words: str) -> str:
     except subprocess.TimeoutExpired as error:
         raise InputError(f"{host.ssh} gives no answer within {TIMEOUT_S:g} s: check network and ssh") from error
     if answer.returncode:
-        last = (answer.stderr.strip() or answer.stdout.strip() or f"exit code {answer.returncode}").splitlines()[-1]
-        raise InputError(f"{host.ssh}: {last}")
+        lines = [line.strip(" │") for line in answer.stderr.splitlines() if any(map(str.isalnum, line))]
+        raise InputError(f"{host.ssh}: {lines[-1] if lines else f'exit code {answer.returncode}'}")
     return answer.stdout

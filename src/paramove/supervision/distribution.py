@@ -138,7 +138,7 @@ def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostK
             parameters={key: _plain(value) for key, value in parameters.items()},
             host=None if name == own else name,
             lockstep=False,
-            restart="on-failure",
+            restart="never",  # time does not wait for members whose relay has ended, so the run could not go on
             stop="last",
         )
     own_peers = nodes[f"relay_{own}"].parameters["peers"]
