@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from paramove.bus import Bus, BusSettings, BusVisitor, topics
+from paramove.bus import Bus, BusSettings, BusVisitor, Publisher, Subscriber, topics
 from paramove.bus.topics import Topic
 from paramove.hosts import HostKeys, Peer, Relay, RelaySettings
 
@@ -68,6 +68,13 @@ class TwoHosts:
         """Ends a host's relay."""
         del self.relays[name]
         self._running[name].close()
+
+    def connected(self, topic: Topic) -> tuple[Publisher, Subscriber]:
+        """Both relays started, a publisher here and its subscriber there, which has been welcomed."""
+        published, subscriber = self.visitor("here").publisher(topic), self.visitor("there").subscriber(topic)
+        self.start()
+        self.until(lambda: subscriber.welcomed, subscriber.receive, published.serve)
+        return published, subscriber
 
     def visitor(self, name: str) -> BusVisitor:
         """Sockets on a host's bus."""

@@ -16,10 +16,7 @@ from paramove.msgs.rule_pb2 import Rule, Rules, Speech
 
 def test_messages_arrive_as_they_were_published_each_once(two_hosts):
     hosts = two_hosts((topics.SPEECH,))
-    published = hosts.visitor("here").publisher(topics.SPEECH)
-    subscriber = hosts.visitor("there").subscriber(topics.SPEECH)
-    hosts.start()
-    hosts.until(lambda: subscriber.welcomed, subscriber.receive, published.serve)
+    published, subscriber = hosts.connected(topics.SPEECH)
     received = []
 
     def receive():
@@ -66,10 +63,7 @@ def test_a_restarted_publisher_is_a_new_epoch_and_no_loss(two_hosts):
 
 def test_images_cross_too_and_only_the_latest_waits_for_a_slow_reader(two_hosts):
     hosts = two_hosts((topics.CAMERA_IMAGE_RAW,))
-    published = hosts.visitor("here").publisher(topics.CAMERA_IMAGE_RAW)
-    subscriber = hosts.visitor("there").subscriber(topics.CAMERA_IMAGE_RAW)
-    hosts.start()
-    hosts.until(lambda: subscriber.welcomed, subscriber.receive, published.serve)
+    published, subscriber = hosts.connected(topics.CAMERA_IMAGE_RAW)
     pixels = np.random.default_rng(0).integers(0, 256, (480, 640, 3), dtype=np.uint8).tobytes()
     (asker,) = hosts.relays["here"]._offers[True].askers.values()
     for number in range(1, 21):  # while the other host does nothing
@@ -116,8 +110,8 @@ def test_what_a_trusted_host_may_not_give_is_rejected_and_counted(two_hosts):
     here = hosts.relays["here"]
     offer = here._offers[0]
     hosts.until(lambda: offer.askers)
-    for identity in offer.askers:
-        offer.send(identity, b"M", b"arm/trajectory\0" + bytes(56), b"anything")
+    for asker in offer.askers.values():
+        offer.send(asker, b"M", b"arm/trajectory\0" + bytes(56), b"anything")
     hosts.until(lambda: "1 rejected" in hosts.relays["there"].detail)
     assert not moves.welcomed
 
@@ -142,10 +136,7 @@ def test_a_host_whose_key_is_not_trusted_is_no_peer(two_hosts):
 
 def test_garbage_and_a_thousand_connections_at_the_port_change_nothing(two_hosts):
     hosts = two_hosts((topics.SPEECH,))
-    published = hosts.visitor("here").publisher(topics.SPEECH)
-    subscriber = hosts.visitor("there").subscriber(topics.SPEECH)
-    hosts.start()
-    hosts.until(lambda: subscriber.welcomed, subscriber.receive, published.serve)
+    published, subscriber = hosts.connected(topics.SPEECH)
     draw = np.random.default_rng(0)
     with contextlib.ExitStack() as opened:
         for number in range(1000):

@@ -65,7 +65,7 @@ def test_it_is_that_of_the_prism(
 @pytest.mark.parametrize(("width", "length"), [(0.020, 0.026), (0.020, 0.050), (0.030, 0.040)])
 @pytest.mark.parametrize("corners", [72, 4])
 @pytest.mark.parametrize("turn_deg", [0.0, 25.0, 50.0, 75.0, 100.0, 125.0, 150.0])
-def test_what_lies_slantwise_is_told_from_what_stands(
+def test_what_lies_slantwise_does_not_count_as_standing(
     view: tuple[Scene, PlaneHomography],
     place: tuple[float, float],
     width: float,

@@ -79,6 +79,14 @@ def test_what_cannot_be_distributed_is_rejected(launch, nodes, overlays, text, w
         application.check(its, Workspace.here())
 
 
+def test_a_host_without_nodes_gets_no_relay(launch, tmp_path):
+    keys = HostKeys(tmp_path / "keys")
+    keys.trust("lab-cam", "k" * 40)
+    its = launch("")
+    nodes = distributed(its, application.check(its, Workspace.here()), keys).file.nodes
+    assert not [name for name in nodes if name.startswith("relay")]
+
+
 def test_a_robot_and_its_driver_need_one_host(tmp_path):
     file = tmp_path / "two.yaml"
     file.write_text(OVERLAY.format(nodes="arm_driver: {host: camera_pc}"))

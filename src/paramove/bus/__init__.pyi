@@ -4,7 +4,6 @@ from .barrier import LockstepBarrier as LockstepBarrier
 from .budget import RateBudget as RateBudget
 from .bus import Bus as Bus
 from .endpoint import BusFolderError as BusFolderError
-from .endpoint import Ownership as Ownership
 from .endpoint import TopicTakenError as TopicTakenError
 from .endpoint import can_read as can_read
 from .endpoint import is_alive as is_alive
@@ -19,9 +18,11 @@ from .envelope import RejectedError as RejectedError
 from .envelope import pack as pack
 from .envelope import unpack as unpack
 from .exchange import Exchange as Exchange
-from .lockstep import SERVICE as SERVICE
+from .lockstep import answers_socket as answers_socket
 from .lockstep import member_mark as member_mark
+from .lockstep import member_socket as member_socket
 from .lockstep import to_marks as to_marks
+from .log_format import is_logged as is_logged
 from .log_format import parse as parse
 from .monitor import ForeignConnections as ForeignConnections
 from .node import NodeConfig as NodeConfig

@@ -13,17 +13,16 @@ from __future__ import annotations
 import logging
 import os
 import time
-from typing import Any
 
 import zmq
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 
 from paramove.bus import topics
 from paramove.bus.bus import Bus
-from paramove.bus.endpoint import Ownership, can_read, prepare_folder, socket_path
+from paramove.bus.endpoint import can_read, prepare_folder
 from paramove.bus.envelope import Reason, RejectedError, unpack
-from paramove.bus.lockstep import SERVICE, from_marks, member_mark, to_marks
-from paramove.bus.monitor import ForeignConnections
+from paramove.bus.lockstep import answers_socket, from_marks, member_mark, to_marks
+from paramove.bus.log_format import is_logged
 from paramove.bus.schemas import schema_hash
 from paramove.bus.subscriber import Received
 from paramove.bus.ticks import TICK_PERIOD_NS
@@ -123,14 +122,9 @@ class LockstepBarrier:
     def _open(self) -> None:
         folder = self._exchange.settings.folder
         prepare_folder(folder)
-        path = socket_path(folder, SERVICE)
-        ownership = Ownership(path, self._bus.node)
-        self._socket: zmq.Socket[Any] = self._exchange.context.socket(zmq.ROUTER)
-        self._socket.setsockopt(zmq.ROUTER_HANDOVER, 1)  # a restarted member comes with the name of the dead one
-        self._socket.setsockopt(zmq.LINGER, 0)
-        self._socket.setsockopt(zmq.MAXMSGSIZE, MAX_ANSWER_BYTES)
-        foreign = ForeignConnections(self._socket, SERVICE)
-        self._socket.bind(f"ipc://{path}")
+        self._socket, ownership, foreign = answers_socket(
+            self._exchange.context, folder, self._bus.node, MAX_ANSWER_BYTES
+        )
         self._exchange.add_socket(self._socket, ownership, foreign)
 
     def _wait(self, missing: set[str] | frozenset[str], what: str) -> None:
@@ -156,7 +150,7 @@ class LockstepBarrier:
                 answer = TickDone.FromString(frames[2])
             except (RejectedError, DecodeError) as error:
                 self.rejected += 1
-                if self.rejected == 10 ** (len(str(self.rejected)) - 1):
+                if is_logged(self.rejected):
                     _log.warning("lockstep: answer rejected (number %d): %s", self.rejected, error)
                 continue
             changed |= self._take(answer)

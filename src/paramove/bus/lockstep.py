@@ -17,14 +17,16 @@ import logging
 import os
 import time
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import zmq
 
 from paramove.bus import topics
-from paramove.bus.endpoint import socket_path
+from paramove.bus.endpoint import Ownership, socket_path
 from paramove.bus.envelope import Envelope, pack, publisher_id
 from paramove.bus.exchange import Exchange, Marks
+from paramove.bus.monitor import ForeignConnections
 from paramove.bus.schemas import schema_hash
 from paramove.bus.ticks import LONGEST_WAIT_S, LoopTick, Tick
 from paramove.msgs.clock_pb2 import Clock, TickDone, TopicMark
@@ -82,6 +84,38 @@ def read_up_to(exchange: Exchange, marks: Marks, names: list[str]) -> None:
         exchange.wait(RETRY_PERIOD_S)
 
 
+def answers_socket(
+    context: zmq.Context[Any], folder: Path, holder: str, max_bytes: int
+) -> tuple[zmq.Socket[Any], Ownership, ForeignConnections]:
+    """The end that receives the answers of all members. Raises TopicTakenError and BusFolderError.
+
+    Args:
+        context: Of ZeroMQ.
+        folder: Bus folder.
+        holder: Name of the node.
+        max_bytes: Of an answer.
+    """
+    path = socket_path(folder, SERVICE)
+    ownership = Ownership(path, holder)
+    socket: zmq.Socket[Any] = context.socket(zmq.ROUTER)
+    socket.setsockopt(zmq.ROUTER_HANDOVER, 1)  # a restarted member comes with the name of the dead one
+    socket.setsockopt(zmq.LINGER, 0)
+    socket.setsockopt(zmq.MAXMSGSIZE, max_bytes)
+    foreign = ForeignConnections(socket, SERVICE)
+    socket.bind(f"ipc://{path}")
+    return socket, ownership, foreign
+
+
+def member_socket(context: zmq.Context[Any], folder: Path, node: str) -> zmq.Socket[Any]:
+    """The end of the member called `node`."""
+    socket: zmq.Socket[Any] = context.socket(zmq.DEALER)
+    socket.setsockopt(zmq.IDENTITY, node.encode())
+    socket.setsockopt(zmq.LINGER, 200)
+    socket.setsockopt(zmq.RECONNECT_IVL, 20)
+    socket.connect(f"ipc://{socket_path(folder, SERVICE)}")
+    return socket
+
+
 class LockstepTicks:
     """Iterations of a member."""
 
@@ -91,11 +125,7 @@ class LockstepTicks:
         self.now_ns = 0
         self.may_publish = False
         self._clock = exchange.subscribe(topics.CLOCK)
-        self._socket: zmq.Socket[Any] = exchange.context.socket(zmq.DEALER)
-        self._socket.setsockopt(zmq.IDENTITY, node.encode())
-        self._socket.setsockopt(zmq.LINGER, 200)
-        self._socket.setsockopt(zmq.RECONNECT_IVL, 20)
-        self._socket.connect(f"ipc://{socket_path(exchange.settings.folder, SERVICE)}")
+        self._socket = member_socket(exchange.context, exchange.settings.folder, node)
         exchange.add_socket(self._socket)
         self._schema = schema_hash(TickDone)
         self._joined = False

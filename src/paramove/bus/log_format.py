@@ -27,6 +27,11 @@ class Stamped:
     text: str
 
 
+def is_logged(count: int) -> bool:
+    """Whether an event is the 1st, 10th, 100th … of its kind, so that a flood of them fills no disk."""
+    return str(count).strip("0") == "1"
+
+
 class NodeFormatter(logging.Formatter):
     """Formats records of one node; times are those of the formatting, just after the event."""
 

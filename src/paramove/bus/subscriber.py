@@ -15,6 +15,7 @@ from paramove.bus.budget import ALLOWANCE, BURST, RateBudget
 from paramove.bus.endpoint import can_read, holder_of, socket_path
 from paramove.bus.envelope import FLAG_RING, SIZE, Envelope, Reason, RejectedError, unpack
 from paramove.bus.image_ring import OverwrittenError, RingReader
+from paramove.bus.log_format import is_logged
 from paramove.bus.monitor import Monitor
 from paramove.bus.schemas import schema_hash
 from paramove.bus.sequence import Arrival, SequenceCounter
@@ -225,7 +226,7 @@ class Subscriber:
     def _log_rejection(self, error: RejectedError) -> None:
         """Of each reason the 1st, 10th, 100th, ... is logged, so that a flood fills no disk."""
         count = self.counter.rejected[error.reason]
-        if count == 10 ** (len(str(count)) - 1):
+        if is_logged(count):
             _log.warning("topic %s: message rejected (%s, number %d): %s", self.name, error.reason.value, count, error)
 
     def _budget_message(self) -> str:

@@ -171,10 +171,8 @@ class Estimates:
 
     def _object(self, name: str) -> dict[str, Any]:
         known, rule = self._objects[name], self._rules.get(name)
-        at_rest = (
-            known.detected if known.state in ("stands", "lies") and known.shape else None
-        )  # its height is accounted for
-        position = at_rest or self._detected_now(name) or known.detected or known.put
+        rests = known.state in ("stands", "lies") and known.shape  # its height is accounted for
+        position = (known.detected if rests else None) or self._detected_now(name) or known.detected or known.put
         state = known.state
         if name == self.held:
             position, state = None, IN_HAND

@@ -19,7 +19,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,62}")
 
 
 class HostKeyError(InputError):
-    """A key that is missing, changed, damaged or open to others; the text says what to do."""
+    """A key that is missing, changed, damaged or open to others; the text has the remedy."""
 
 
 @dataclass(frozen=True)

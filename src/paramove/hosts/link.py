@@ -5,7 +5,7 @@ alone: it is pinned, so no host can take another one's place, and gets only what
 a host gives is checked against the topics that may come from it. Frames, after the kind of the message:
 
     WANT     time of sending, names of topics       asker to offerer, 25 times a second
-    BEAT     that time, the offerer's time          the reply
+    BEAT     that time                              the reply
     MESSAGE  topic and header, payload              offerer to asker
     TAKEN    name of a topic                        asker to offerer: an image has arrived, send the next
     DONE     header, answer                         asker to offerer: a member of lockstep has answered
@@ -25,7 +25,7 @@ from typing import Any
 import zmq
 from zmq.auth.thread import ThreadAuthenticator
 
-from paramove.bus import ForeignConnections, can_read
+from paramove.bus import ForeignConnections, can_read, is_logged
 from paramove.hosts.keys import KeyPair
 from paramove.hosts.settings import Peer
 
@@ -34,7 +34,7 @@ BEAT_S = 0.04
 LOST_S = 2.0
 """Without a reply for so long, a link counts as lost."""
 MAX_ASKED_BYTES = 65_536
-_TIME, _TIMES = struct.Struct("<q"), struct.Struct("<qq")
+_TIME = struct.Struct("<q")
 _log = logging.getLogger(__name__)
 
 
@@ -43,6 +43,7 @@ class Asker:
     """A connected host, while it asks.
 
     Attributes:
+        identity: Of its connection.
         host: Its name.
         wanted: Names of the topics that it wants and may have.
         latest_s: When it asked last.
@@ -50,6 +51,7 @@ class Asker:
         waiting: By topic, the latest image that waits until it has.
     """
 
+    identity: bytes
     host: str
     wanted: frozenset[str] = frozenset()
     latest_s: float = 0.0
@@ -76,7 +78,7 @@ class Gatekeeper:
         """Whether this key may connect; called by pyzmq."""
         known = key in self._keys
         self.rejected += not known
-        if self.rejected == 10 ** (len(str(self.rejected)) - 1) and not known:
+        if is_logged(self.rejected) and not known:
             _log.warning("a computer with the unknown key %s was rejected (number %d)", key.decode(), self.rejected)
         return known
 
@@ -127,7 +129,7 @@ class Offer:
             asker = self.askers.get(identity)
             if asker is None:
                 host = self._hosts.get(str(frames[-1].get("User-Id")), "")
-                asker = self.askers[identity] = Asker(host)
+                asker = self.askers[identity] = Asker(identity, host)
             asker.latest_s = time.monotonic()
             new: frozenset[str] = frozenset()
             if content[:1] == [WANT] and len(content) == 3 and len(content[1]) == _TIME.size:
@@ -135,8 +137,7 @@ class Offer:
                 allowed = names & self._may_have.get(asker.host, frozenset())
                 self.rejected += allowed != names
                 new, asker.wanted = allowed - asker.wanted, allowed
-                sent = _TIME.unpack(content[1])[0]
-                self.send(identity, BEAT, _TIMES.pack(sent, time.monotonic_ns()))
+                self.send(asker, BEAT, content[1])
             elif content[:1] not in ([TAKEN], [DONE]):
                 self.rejected += 1
                 continue
@@ -147,17 +148,17 @@ class Offer:
         now_s = time.monotonic()
         self.askers = {one: asker for one, asker in self.askers.items() if now_s - asker.latest_s < LOST_S}
 
-    def send(self, identity: bytes, *frames: bytes) -> bool:
+    def send(self, asker: Asker, *frames: bytes) -> bool:
         """Sends to one host; whether it could be sent at once."""
         try:
-            self.socket.send_multipart([identity, *frames], zmq.NOBLOCK)
+            self.socket.send_multipart([asker.identity, *frames], zmq.NOBLOCK)
         except zmq.Again:
             self.blocked += 1
             return False
         except zmq.ZMQError as error:
             if error.errno != zmq.EHOSTUNREACH:
                 raise
-            self.askers.pop(identity, None)
+            self.askers.pop(asker.identity, None)
             return False
         return True
 
@@ -180,14 +181,13 @@ class Request:
     Attributes:
         rejected: Messages of topics that may not come from there.
         round_trip_s: The shortest of the last ten seconds.
-        offset_s: By how much the clock there is ahead, to half of the round trip.
         latest_s: When a reply came last, 0 before the first.
     """
 
     def __init__(self, context: zmq.Context[Any], port: int, own: KeyPair, peer: Peer, names: frozenset[str]) -> None:
         self.names = names
         self.rejected = 0
-        self.round_trip_s = self.offset_s = float("nan")
+        self.round_trip_s = float("nan")
         self.latest_s = 0.0
         self._best_s = float("-inf")
         self.socket: zmq.Socket[Any] = context.socket(zmq.DEALER)
@@ -218,13 +218,13 @@ class Request:
         """What has come in: name on the bus, header, payload."""
         while can_read(self.socket):
             frames = self.socket.recv_multipart(zmq.NOBLOCK)
-            if frames[0] == BEAT and len(frames) == 2 and len(frames[1]) == _TIMES.size:
-                self._measure(*_TIMES.unpack(frames[1]))
+            if frames[0] == BEAT and len(frames) == 2 and len(frames[1]) == _TIME.size:
+                self._measure(*_TIME.unpack(frames[1]))
                 continue
             name, mark, header = frames[1].partition(b"\0") if len(frames) == 3 else (b"", b"", b"")
             if frames[0] != MESSAGE or not mark or name.decode("utf-8", "replace") not in self.names:
                 self.rejected += 1
-                if self.rejected == 10 ** (len(str(self.rejected)) - 1):
+                if is_logged(self.rejected):
                     _log.warning("a message of %r is not to come from there (number %d)", name[:80], self.rejected)
                 continue
             yield name.decode(), header, frames[2]
@@ -233,13 +233,11 @@ class Request:
         """Closes the socket."""
         self.socket.close(linger=200)
 
-    def _measure(self, sent_ns: int, there_ns: int) -> None:
-        """One way cannot take longer than both: half the shortest round trip bounds the offset's error."""
-        now_ns, self.latest_s = time.monotonic_ns(), time.monotonic()
-        round_trip_s = 1e-9 * (now_ns - sent_ns)
+    def _measure(self, sent_ns: int) -> None:
+        self.latest_s = time.monotonic()
+        round_trip_s = self.latest_s - 1e-9 * sent_ns
         if not round_trip_s > self.round_trip_s or self.latest_s - self._best_s > 10.0:
             self._best_s, self.round_trip_s = self.latest_s, round_trip_s
-            self.offset_s = 1e-9 * (there_ns - (sent_ns + now_ns) / 2)
 
 
 def _keep_alive(socket: zmq.Socket[Any]) -> None:
@@ -247,4 +245,3 @@ def _keep_alive(socket: zmq.Socket[Any]) -> None:
     socket.setsockopt(zmq.HEARTBEAT_IVL, 500)
     socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, round(1000 * LOST_S))
     socket.setsockopt(zmq.HEARTBEAT_TTL, round(1000 * LOST_S))
-    socket.setsockopt(zmq.IPV6, 0)

@@ -12,6 +12,7 @@ import contextlib
 import logging
 import math
 import os
+import select
 import time
 from typing import Any
 
@@ -22,31 +23,29 @@ from paramove.bus import (
     FLAG_LAST_VALUE,
     FLAG_RING,
     FLAG_WELCOME,
-    SERVICE,
     SIZE,
     Bus,
     Envelope,
-    Ownership,
     Publisher,
     RejectedError,
     Subscriber,
     Topic,
+    answers_socket,
     can_read,
     member_mark,
+    member_socket,
     pack,
     schema_hash,
-    socket_path,
     topics,
     unpack,
 )
 from paramove.hosts.keys import HostKeyError, HostKeys
-from paramove.hosts.link import BEAT_S, DONE, MESSAGE, TAKEN, Asker, Gatekeeper, Offer, Request
+from paramove.hosts.link import BEAT_S, DONE, MAX_ASKED_BYTES, MESSAGE, TAKEN, Asker, Gatekeeper, Offer, Request
 from paramove.hosts.settings import RelaySettings
 from paramove.msgs.clock_pb2 import TickDone, TopicMark
 
 UNDER_WAY = 2
 """Images of a topic on their way to a host at once."""
-MAX_ANSWER_BYTES = 65_536
 _POLL_MS = 20
 _LOOK_S = 0.25
 _log = logging.getLogger(__name__)
@@ -114,7 +113,7 @@ class Relay:
         for publisher in self._publishers.values():
             publisher.close()
         for socket in self._members.values():
-            socket.close(linger=200)
+            socket.close()
         if self._answers is not None:
             self._answers.close()
         for request in self._each_request():
@@ -183,6 +182,8 @@ class Relay:
                 self._poller.register(source.socket, zmq.POLLIN)
         for publisher in self._publishers.values():
             publisher.foreign.look()
+        if self._answers is not None:
+            self._answers.foreign.look()
         for offer in self._offers:
             offer.foreign.look()
             offer.forget_silent()
@@ -194,34 +195,31 @@ class Relay:
 
     def _send_all(self, source: _Source, envelope: Envelope, payload: bytes) -> None:
         offer, is_image = self._offer_of(source.topic), source.topic.is_image and not envelope.is_welcome
-        frames = [source.frame + pack(envelope, payload), payload]
-        for identity, asker in list(offer.askers.items()):
+        frames = source.frames(envelope, payload)
+        for asker in list(offer.askers.values()):
             if source.name not in asker.wanted:
                 continue
             if is_image and asker.under_way[source.name] >= UNDER_WAY:
                 asker.waiting[source.name] = frames  # the one that waited is no longer the latest
-            elif offer.send(identity, MESSAGE, *frames):
+            elif offer.send(asker, MESSAGE, *frames):
                 asker.under_way[source.name] += is_image
 
     def _taken(self, offer: Offer, asker: Asker, name: str) -> None:
         asker.under_way[name] = max(0, asker.under_way[name] - 1)
-        identity = next((one for one, other in offer.askers.items() if other is asker), None)
-        if name in asker.waiting and identity is not None:
-            asker.under_way[name] += offer.send(identity, MESSAGE, *asker.waiting.pop(name))
+        if name in asker.waiting:
+            asker.under_way[name] += offer.send(asker, MESSAGE, *asker.waiting.pop(name))
 
     def _greet(self, offer: Offer, asker: Asker, source: _Source) -> None:
         """A host that asks anew gets the state of the topic: from where on to count, and the last value."""
         state = source.state()
-        identity = next((one for one, other in offer.askers.items() if other is asker), None)
-        if state is not None and identity is not None:
-            envelope, payload = state
-            offer.send(identity, MESSAGE, source.frame + pack(envelope, payload), payload)
+        if state is not None:
+            offer.send(asker, MESSAGE, *source.frames(*state))
 
     def _answer(self, frames: list[bytes]) -> None:
         """A member on another host has answered a tick: this process stands for it at the simulator's."""
         header, payload = frames
         try:
-            envelope = unpack(header, payload, schema_hash(TickDone), MAX_ANSWER_BYTES)
+            envelope = unpack(header, payload, schema_hash(TickDone), MAX_ASKED_BYTES)
             answer = TickDone.FromString(payload)
         except (RejectedError, DecodeError) as error:
             _log.warning("lockstep: answer from another host rejected: %s", error)
@@ -229,11 +227,7 @@ class Relay:
         answer.watched_pid = os.getpid()
         payload = answer.SerializeToString()
         if answer.node not in self._members:
-            socket: zmq.Socket[Any] = self._here.socket(zmq.DEALER)
-            socket.setsockopt(zmq.IDENTITY, answer.node.encode())
-            socket.setsockopt(zmq.RECONNECT_IVL, 20)
-            socket.connect(f"ipc://{socket_path(self._bus.settings.folder, SERVICE)}")
-            self._members[answer.node] = socket
+            self._members[answer.node] = member_socket(self._here, self._bus.settings.folder, answer.node)
         with contextlib.suppress(zmq.Again):
             self._members[answer.node].send_multipart([pack(envelope, payload), payload], zmq.NOBLOCK)
 
@@ -269,7 +263,6 @@ class _Source:
 
     def __init__(self, context: zmq.Context[Any], folder: Any, topic: Topic, name: str) -> None:
         self.topic, self.name = topic, name
-        self.frame = name.encode() + b"\0"
         self.subscriber = Subscriber(context, folder, topic, name)
         self._known: tuple[int | None, int] = (None, 0)
         self._last: tuple[Envelope, bytes] | None = None
@@ -278,6 +271,10 @@ class _Source:
     def socket(self) -> zmq.Socket[Any]:
         """Of the subscriber; another one after it was revived."""
         return self.subscriber.socket
+
+    def frames(self, envelope: Envelope, payload: bytes) -> list[bytes]:
+        """A message of the topic as it crosses."""
+        return [self.name.encode() + b"\0" + pack(envelope, payload), payload]
 
     def messages(self) -> list[tuple[Envelope, bytes]]:
         """What has come in; a welcome where only that has shown how far the publisher is."""
@@ -310,12 +307,9 @@ class _Answers:
     """Answers of this host's members of lockstep, whose simulator runs on another host."""
 
     def __init__(self, context: zmq.Context[Any], bus: Bus) -> None:
-        path = socket_path(bus.settings.folder, SERVICE)
-        self._ownership = Ownership(path, bus.node)
-        self.socket: zmq.Socket[Any] = context.socket(zmq.ROUTER)
-        self.socket.setsockopt(zmq.ROUTER_HANDOVER, 1)
-        self.socket.setsockopt(zmq.MAXMSGSIZE, MAX_ANSWER_BYTES)
-        self.socket.bind(f"ipc://{path}")
+        self.socket, self._ownership, self.foreign = answers_socket(
+            context, bus.settings.folder, bus.node, MAX_ASKED_BYTES
+        )
         self._pidfds: dict[str, tuple[int, int]] = {}
 
     def collect(self) -> list[tuple[bytes, bytes]]:
@@ -326,7 +320,8 @@ class _Answers:
             if len(frames) == 3 and len(frames[1]) == SIZE:
                 self._follow(frames[2])
                 found.append((frames[1], frames[2]))
-        return found + [self._farewell(node) for node in list(self._pidfds) if self._has_ended(node)]
+        ended = select.select([descriptor for _, descriptor in self._pidfds.values()], [], [], 0.0)[0]
+        return found + [self._farewell(node) for node, (_, its) in list(self._pidfds.items()) if its in ended]
 
     def _follow(self, payload: bytes) -> None:
         with contextlib.suppress(DecodeError, OSError):
@@ -336,11 +331,6 @@ class _Answers:
                 self._pidfds[answer.node] = (answer.pid, os.pidfd_open(answer.pid))
             elif answer.kind == TickDone.KIND_LEAVE:
                 self._forget(answer.node)
-
-    def _has_ended(self, node: str) -> bool:
-        poller = zmq.Poller()
-        poller.register(self._pidfds[node][1], zmq.POLLIN)
-        return bool(poller.poll(0))
 
     def _farewell(self, node: str) -> tuple[bytes, bytes]:
         pid = self._pidfds[node][0]
@@ -357,5 +347,6 @@ class _Answers:
         """Closes the socket, and gives its path up."""
         for node in list(self._pidfds):
             self._forget(node)
-        self.socket.close(linger=0)
+        self.foreign.close()
+        self.socket.close()
         self._ownership.release()

@@ -178,10 +178,9 @@ class Recognizer:
     def _shape_of(self, name: str, homography: PlaneHomography) -> ObjectShape | None:
         """As it looked in the clearest view of its last rest; standing, if it may have been held up then."""
         with contextlib.suppress(ValueError):  # on the plane's horizon
-            latest, standing = (
-                object_shape(np.array(outlines.get(name, [])), homography)
-                for outlines in (self._outlines, self._standing)
-            )
+            outline, before = self._outlines.get(name, []), self._standing.get(name, [])
+            latest = object_shape(np.array(outline), homography)
+            standing = latest if before is outline else object_shape(np.array(before), homography)
             held_up = latest is not None and standing is not None and latest.face > LARGER * standing.face
             return standing if held_up else latest
         return None

@@ -1,4 +1,4 @@
-"""One host's part of a run that another host has launched: starts, ends and reports its nodes as it is told.
+"""One host's part of a run that another host has launched: starts, ends and reports its nodes on request.
 
 It reads and writes lines of JSON by its standard input and output, which the launcher's ssh connects. Where the
 connection ends, or is silent for `SILENT_S`, it ends its nodes by itself, the arm first. From the launcher:
@@ -37,7 +37,7 @@ from paramove.supervision.domain import DomainError, held_domain
 from paramove.supervision.environment import LimitError, allow_open_files, node_environment
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.launch_schema import LaunchFile
-from paramove.supervision.processes import Guard, SupervisedProcess
+from paramove.supervision.processes import Guard, SupervisedProcess, node_process
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.stopping import STOP_S, stop_waves
 from paramove.workspace import Workspace
@@ -98,7 +98,7 @@ class Agent:
         self._processes: dict[str, SupervisedProcess] = {}
         self._logs: dict[str, int] = {}
         self._ends = False
-        self._heard_s = self._alive_due_s = time.monotonic()
+        self._latest_s = self._alive_due_s = time.monotonic()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._end)
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
@@ -143,12 +143,12 @@ class Agent:
         return None
 
     def _serve(self) -> None:
-        """Does what it is told until the connection, or the run, has ended."""
-        self._heard_s = time.monotonic()
-        while not (self._ends or self._lines.ended) and time.monotonic() - self._heard_s < SILENT_S:
+        """Does what is requested until the connection, or the run, has ended."""
+        self._latest_s = time.monotonic()
+        while not (self._ends or self._lines.ended) and time.monotonic() - self._latest_s < SILENT_S:
             self._wait()
             for line in self._lines.read():
-                self._heard_s = time.monotonic()
+                self._latest_s = time.monotonic()
                 self._obey(line)
             self._report()
 
@@ -167,19 +167,19 @@ class Agent:
     def _start(self, name: str, nice: int) -> None:
         if name in self._processes:
             return
-        command = [sys.executable, "-m", self._file.nodes[name].module, "--config", str(self._folder.config(name))]
         try:
-            process = SupervisedProcess(
-                command,
+            process = node_process(
+                self._file.nodes[name].module,
+                self._folder.config(name),
+                self._folder.log(name),
+                nice,
                 folder=self._workspace.root,
                 environment=node_environment(os.environ, self._workspace),
                 guard=self._guard,
-                log=self._folder.log(name),
             )
         except OSError as error:
             self._say(failed=name, reason=error.strerror or str(error))
             return
-        process.prioritise(nice)
         self._processes[name] = process
         self._say(started=name, pid=process.pid)
 

@@ -98,13 +98,15 @@ def _remote_hosts(
     connected: contextlib.ExitStack,
 ) -> dict[str, RemoteHost]:
     """Connects to the other hosts; raises InputError for one that does not take part."""
+    if not launch.file.hosts:
+        return {}
     begin = {
         "launch": launch.file.model_dump(mode="json"),
         "name": launch.name,
         "domain": domain,
         "clock": clock,
         "launcher": socket.gethostname(),
-        "release": release_of(workspace) if launch.file.hosts else "",
+        "release": release_of(workspace),
     }
     hosts = {}
     for name, settings in launch.file.hosts.items():

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shlex
 import socket
 import subprocess
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from paramove.bus import CLOCK, Topic, topics
 from paramove.documents import DocumentError, InputError, nearest
-from paramove.hosts import HostKeys, Peer
+from paramove.hosts import HostKeys, Peer, RelaySettings
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.launch_schema import HostSettings, LaunchFile, NodeSettings
@@ -106,6 +107,10 @@ def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostK
     keys = keys or HostKeys()
     trusted = keys.trusted()
     peers, crosses = {}, crossing(launch, interfaces)
+    for (here, there), names in crosses.items():
+        if there == own:  # a relay reports its status as every node there
+            status = topics.status(_relay(here)).name
+            names[status] = status
     for name, host in file.hosts.items():
         if host.ssh is not None and host.ssh not in trusted:
             raise InputError(f"{host.ssh} is not trusted yet: paramove host trust {host.ssh}")
@@ -126,32 +131,22 @@ def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostK
         }
         if not others:
             continue
-        relay = f"relay_{name}"
-        if name != own:  # as of every other node there
-            status = topics.status(relay).name
-            others[own] = others[own].model_copy(update={"wants": {**others[own].wants, status: status}})
-        parameters = {"address": peers[name].address, "port": host.port, "peers": others}
-        if name != clock:
-            parameters["clock_from"] = clock
-        nodes[relay] = NodeSettings(
+        settings = RelaySettings(
+            address=peers[name].address, port=host.port, peers=others, clock_from=None if name == clock else clock
+        )
+        nodes[_relay(name)] = NodeSettings(
             module="nodes.relay",
-            parameters={key: _plain(value) for key, value in parameters.items()},
+            parameters=settings.model_dump(mode="json", exclude_none=True),
             host=None if name == own else name,
             lockstep=False,
             restart="never",  # time does not wait for members whose relay has ended, so the run could not go on
             stop="last",
         )
-    own_peers = nodes[f"relay_{own}"].parameters["peers"]
-    for name in own_peers:
-        status = topics.status(f"relay_{name}").name
-        own_peers[name]["gives"][status] = status
     return replace(launch, file=file.model_copy(update={"nodes": nodes}))
 
 
-def _plain(value: object) -> object:
-    if isinstance(value, dict):
-        return {key: one.model_dump(mode="json") if isinstance(one, Peer) else one for key, one in value.items()}
-    return value
+def _relay(host: str) -> str:
+    return f"relay_{host}"
 
 
 def _address(name: str, hosts: Mapping[str, HostSettings]) -> str:
@@ -169,12 +164,10 @@ def _address(name: str, hosts: Mapping[str, HostSettings]) -> str:
 
 
 def _resolved(ssh: str) -> str:
-    lines: Sequence[str] = ()
-    try:
+    lines: list[str] = []
+    with contextlib.suppress(OSError, subprocess.TimeoutExpired):
         answer = subprocess.run(["ssh", "-G", ssh], capture_output=True, text=True, timeout=10, check=False)
         lines = answer.stdout.splitlines()
-    except (OSError, subprocess.TimeoutExpired):
-        pass
     name = next((line.split()[1] for line in lines if line.startswith("hostname ")), ssh)
     try:
         return socket.gethostbyname(name)

@@ -173,6 +173,16 @@ class SupervisedProcess:
             os.killpg(self.pid, number)
 
 
+def node_process(
+    module: str, config: Path, log: Path, nice: int, *, folder: Path, environment: Mapping[str, str], guard: Guard
+) -> SupervisedProcess:
+    """Starts a node's module with its configuration."""
+    command = [sys.executable, "-m", module, "--config", str(config)]
+    process = SupervisedProcess(command, folder=folder, environment=environment, guard=guard, log=log)
+    process.prioritise(nice)
+    return process
+
+
 @contextlib.contextmanager
 def _output(log: Path | None):  # type: ignore[no-untyped-def]
     if log is None:

@@ -24,12 +24,12 @@ LOST = 255
 
 
 class RemoteHost:
-    """The launcher's end of an agent, while it is a context. Waits for the agent to be ready.
+    """The launcher's end of an agent, until `close`. Waits for the agent to be ready.
 
     Args:
         name: Of the host in the launch file.
         settings: How it is reached.
-        begin: What the agent is told: see `agent.py`.
+        begin: The first line to the agent: see `agent.py`.
         folder: Of the run here; the output of the nodes there is appended to its logs.
 
     Raises:
@@ -44,21 +44,22 @@ class RemoteHost:
         self._folder = folder
         self._processes: dict[str, RemoteProcess] = {}
         self._answers: dict[str, dict[str, Any]] = {}
-        self._process = subprocess.Popen(
-            ssh_command(settings, "host", "agent"),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=folder.log(f"agent_{name}").open("ab"),
-            start_new_session=True,  # Ctrl-C is for the launcher alone
-        )
+        with folder.log(f"agent_{name}").open("ab") as log:
+            self._process = subprocess.Popen(
+                ssh_command(settings, "host", "agent"),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                start_new_session=True,  # Ctrl-C is for the launcher alone
+            )
         assert self._process.stdout is not None
         self._lines = Lines(self._process.stdout.fileno())
-        self._heard_s = self._alive_due_s = time.monotonic()
+        self._latest_s = self._alive_due_s = time.monotonic()
         self.send(begin={**begin, "host": name})
         end_s = time.monotonic() + BEGIN_S
         while "ready" not in self._answers and not self.lost and time.monotonic() < end_s:
             select.select([self.descriptor], [], [], ALIVE_S)
-            self._heard_s = time.monotonic()
+            self._latest_s = time.monotonic()
             self.serve()
         if "ready" not in self._answers:
             self.close()
@@ -74,9 +75,9 @@ class RemoteHost:
         """Reads what the agent has reported, and shows it that the launcher is alive; to be called often."""
         now_s = time.monotonic()
         for line in self._lines.read():
-            self._heard_s = now_s
+            self._latest_s = now_s
             self._take(line)
-        if not self.lost and (self._lines.ended or now_s - self._heard_s > SILENT_S):
+        if not self.lost and (self._lines.ended or now_s - self._latest_s > SILENT_S):
             self.lost = "its agent has ended" if self._lines.ended else f"it is silent for {SILENT_S:g} s"
             for process in self._processes.values():
                 process.has_ended(LOST)
@@ -125,8 +126,8 @@ class RemoteHost:
         for word in ("started", "failed"):
             if word in line:
                 self._answers[str(line[word])] = line
-        if "log" in line and line["log"] in self._folder_names():
-            with self._folder.log(line["log"]).open("a", encoding="utf-8") as file:
+        if (name := str(line.get("log"))) in self._answers:
+            with self._folder.log(name).open("a", encoding="utf-8") as file:
                 file.write(str(line.get("text", "")))
         process = self._processes.get(str(line.get("ended", line.get("halted", ""))))
         if process is not None and "ended" in line:
@@ -134,9 +135,6 @@ class RemoteHost:
             process.has_ended(int(line["code"]))
         elif process is not None:
             process.is_halted = bool(line["is"])
-
-    def _folder_names(self) -> set[str]:
-        return {*self._processes, *self._answers}
 
 
 class RemoteProcess:

@@ -20,7 +20,7 @@ from paramove.supervision.domain import Domain
 from paramove.supervision.environment import node_environment
 from paramove.supervision.events import EventLog, signal_name
 from paramove.supervision.launch_file import Launch
-from paramove.supervision.processes import Guard, NodeProcess, SupervisedProcess, last_lines
+from paramove.supervision.processes import Guard, NodeProcess, SupervisedProcess, last_lines, node_process
 from paramove.supervision.remote_host import RemoteHost
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.status_subscriber import StatusSubscriber
@@ -290,16 +290,15 @@ class Supervisor:
         node = self._file.nodes[name]
         if node.host is not None:
             return self._hosts[node.host].start(name, NICE[node.priority])
-        command = [sys.executable, "-m", node.module, "--config", str(self._folder.config(name))]
-        process = SupervisedProcess(
-            command,
+        return node_process(
+            node.module,
+            self._folder.config(name),
+            self._folder.log(name),
+            NICE[node.priority],
             folder=self._workspace,
             environment=self._environment,
             guard=self._guard,
-            log=self._folder.log(name),
         )
-        process.prioritise(NICE[node.priority])
-        return process
 
     def _handle_status(self, status: NodeStatus) -> None:
         if status.node in self.nodes:
