@@ -5,6 +5,9 @@ Subscribes  arm/trajectory         JointTrajectory        events
             operator/arm_at_start  ArmRequest             events, latched
             operator/stop          StopRequest            events, latched
             operator/estop         StopRequest            events, latched
+            operator/arm_away      ArmRequest             events, latched; from other hosts
+            operator/stop_away     StopRequest            events, latched; from other hosts
+            hosts/link             LinkState              100 Hz, while other hosts reply
             wire/hoap3/state       Hoap3State             15 Hz   joint units
 Publishes   wire/hoap3/stream      StreamBatch            15 Hz while moving, joint units
             arm/joint_states       foxglove.JointStates   15 Hz   rad
@@ -20,21 +23,26 @@ from paramove.robots import RobotDescription, RobotFolder, ThisLaunch
 from paramove.robots.hoap3 import batch_message, state_of
 from paramove.robots.streaming import ArmDriver
 
-SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.WIRE_HOAP3_STATE)
+SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.HOSTS_LINK, topics.WIRE_HOAP3_STATE)
 PUBLISHES = (topics.WIRE_HOAP3_STREAM, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
 
 
 class Config(NodeConfig):
-    """`robot`: folder of the robot's description."""
+    """`robot`: folder of the robot's description; `link_timeout_s`: see `ArmDriver`."""
 
     robot: RobotFolder = Path("robot_description/hoap3")
+    link_timeout_s: float | None = None
 
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the robot then comes to rest by the stop ramp that it already has."""
     launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
-    driver = ArmDriver(RobotDescription.load(config.robot), no_program=lambda: launch.why_no_program(bus.settings))
-    handle: dict[topics.Topic, Any] = {topics.ARM_TRAJECTORY: driver.on_trajectory}
+    driver = ArmDriver(
+        RobotDescription.load(config.robot),
+        no_program=lambda: launch.why_no_program(bus.settings),
+        link_timeout_s=config.link_timeout_s,
+    )
+    handle: dict[topics.Topic, Any] = {topics.ARM_TRAJECTORY: driver.on_trajectory, topics.HOSTS_LINK: driver.on_link}
     handle |= {topics.WIRE_HOAP3_STATE: lambda message, at_ns: driver.on_robot_state(state_of(message), at_ns)}
     handle |= dict.fromkeys(topics.ARMINGS, driver.on_arm_request) | dict.fromkeys(topics.STOPS, driver.on_stop)
     bus.ready(driver.detail)

@@ -5,6 +5,9 @@ Subscribes  arm/trajectory          JointTrajectory        events
             operator/arm_at_start   ArmRequest             events, latched
             operator/stop           StopRequest            events, latched
             operator/estop          StopRequest            events, latched
+            operator/arm_away       ArmRequest             events, latched; from other hosts
+            operator/stop_away      StopRequest            events, latched; from other hosts
+            hosts/link              LinkState              100 Hz, while other hosts reply
 Publishes   arm/joint_states        foxglove.JointStates   15 Hz   rad
             arm/joint_states/fast   foxglove.JointStates   100 Hz  rad
             arm/trajectory_status   TrajectoryStatus       events
@@ -16,7 +19,7 @@ from paramove.bus import TICK_PERIOD_NS, Bus, NodeConfig, Tick, main, topics
 from paramove.robots import RobotFolder, ThisLaunch
 from paramove.robots.dynamixel import DrivenArm, ServoArmSetup
 
-SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS)
+SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.HOSTS_LINK)
 JOINTS = (topics.ARM_JOINT_STATES, topics.ARM_JOINT_STATES_FAST)
 PUBLISHES = (*JOINTS, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY, topics.ARM_MOTORS)
 
@@ -36,6 +39,7 @@ def run(bus: Bus, config: Config) -> None:
         bus.ready(arm.detail)
         handle = {
             topics.ARM_TRAJECTORY: arm.on_trajectory,
+            topics.HOSTS_LINK: arm.on_link,
             **dict.fromkeys(topics.ARMINGS, arm.on_arm_request),
             **dict.fromkeys(topics.STOPS, arm.on_stop),
         }

@@ -30,7 +30,7 @@ from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
-from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState, StopRequest
+from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, SafetyState, StopRequest
 from paramove.msgs.tracked_objects_pb2 import TrackedObjects
 from paramove.msgs.truth_pb2 import TruthArm, TruthLayout, TruthState
 
@@ -147,6 +147,10 @@ OPERATOR_ARM_AT_START = replace(OPERATOR_ARM, name="operator/arm_at_start")
 OPERATOR_STOP = Topic("operator/stop", StopRequest, None, _LATCHED, recorded=True)
 OPERATOR_ESTOP = replace(OPERATOR_STOP, name="operator/estop")
 """From a terminal: a topic has one publisher, and that of `operator/stop` may be the live page."""
+OPERATOR_ARM_AWAY = replace(OPERATOR_ARM, name="operator/arm_away", recorded=False)
+OPERATOR_STOP_AWAY = replace(OPERATOR_STOP, name="operator/stop_away", recorded=False)
+"""From persons at other hosts, by this host's relay; recorded under the names that they have there."""
+HOSTS_LINK = Topic("hosts/link", LinkState, 100, _LATEST)
 WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES)
 WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=True)
 TRUTH_LAYOUT = Topic("truth/layout", TruthLayout, None, _LATCHED, "world")
@@ -165,10 +169,14 @@ TOPICS: tuple[Topic, ...] = tuple(
 RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
 STEREO_IMAGES_RAW = CAMERA_IMAGES_RAW[:2]
 """Images of two cameras, for tracking an arm."""
-ARMINGS = (OPERATOR_ARM, OPERATOR_ARM_AT_START)
+PERSONS_STOPS = (OPERATOR_STOP, OPERATOR_ESTOP)
+"""A person's stops."""
+AWAY = {OPERATOR_ARM.name: OPERATOR_ARM_AWAY, **{topic.name: OPERATOR_STOP_AWAY for topic in PERSONS_STOPS}}
+"""What persons request at other hosts -> how it is published here, where persons have the topic for themselves."""
+ARMINGS = (OPERATOR_ARM, OPERATOR_ARM_AT_START, OPERATOR_ARM_AWAY)
 """Arming requests: a driver subscribes to all of them."""
-STOPS = (OPERATOR_STOP, OPERATOR_ESTOP)
-"""A person's stops: a driver subscribes to all of them."""
+STOPS = (*PERSONS_STOPS, OPERATOR_STOP_AWAY)
+"""Stops: a driver subscribes to all of them."""
 
 _STATUS_PREFIX = "status/"
 _NAME = re.compile(r"[a-z0-9_]+(/[a-z0-9_]+)*")

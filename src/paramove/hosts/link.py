@@ -4,8 +4,9 @@ Each relay offers its topics at a ROUTER and asks the other hosts for theirs wit
 alone: it is pinned, so no host can take another one's place, and gets only what the launch file lets cross to it. What
 a host gives is checked against the topics that may come from it. Frames, after the kind of the message:
 
-    WANT     time of sending, names of topics       asker to offerer, 25 times a second
-    BEAT     that time                              the reply
+    WANT     names of topics                        asker to offerer, five times a second
+    BEAT     time of sending                        asker to offerer, 100 times a second; images 10 times
+    BEAT     that time, time of the reply           the reply, each by its own host's monotonic clock
     MESSAGE  topic and header, payload              offerer to asker
     TAKEN    name of a topic                        asker to offerer: an image has arrived, send the next
     DONE     header, answer                         asker to offerer: a member of lockstep has answered
@@ -26,11 +27,12 @@ import zmq
 from zmq.auth.thread import ThreadAuthenticator
 
 from paramove.bus import ForeignConnections, can_read, is_logged
+from paramove.hosts.clock_offset import ClockOffset
 from paramove.hosts.keys import KeyPair
 from paramove.hosts.settings import Peer
 
 WANT, BEAT, MESSAGE, TAKEN, DONE = b"W", b"B", b"M", b"C", b"D"
-BEAT_S = 0.04
+WANT_S, BEAT_S, IMAGES_BEAT_S = 0.2, 0.01, 0.1
 LOST_S = 2.0
 """Without a reply for so long, a link counts as lost."""
 MAX_ASKED_BYTES = 65_536
@@ -132,12 +134,14 @@ class Offer:
                 asker = self.askers[identity] = Asker(identity, host)
             asker.latest_s = time.monotonic()
             new: frozenset[str] = frozenset()
-            if content[:1] == [WANT] and len(content) == 3 and len(content[1]) == _TIME.size:
-                names = frozenset(filter(None, content[2].decode("utf-8", "replace").split("\n")))
+            if content[:1] == [BEAT] and len(content) == 2 and len(content[1]) == _TIME.size:
+                self.send(asker, BEAT, content[1], _TIME.pack(time.monotonic_ns()))
+                continue
+            if content[:1] == [WANT] and len(content) == 2:
+                names = frozenset(filter(None, content[1].decode("utf-8", "replace").split("\n")))
                 allowed = names & self._may_have.get(asker.host, frozenset())
                 self.rejected += allowed != names
                 new, asker.wanted = allowed - asker.wanted, allowed
-                self.send(asker, BEAT, content[1])
             elif content[:1] not in ([TAKEN], [DONE]):
                 self.rejected += 1
                 continue
@@ -177,24 +181,39 @@ class Request:
         own: Keys of this host.
         peer: Whom it asks: its pinned key must be the one there.
         names: Of the topics that it wants.
+        beat_s: Time between two beats.
 
     Attributes:
+        clock: That of the other host.
         rejected: Messages of topics that may not come from there.
         round_trip_s: The shortest of the last ten seconds.
-        latest_s: When a reply came last, 0 before the first.
+        confirmed_ns: When the latest request was sent that has been answered, 0 before: what the other host gave until
+            then has arrived.
     """
 
-    def __init__(self, context: zmq.Context[Any], port: int, own: KeyPair, peer: Peer, names: frozenset[str]) -> None:
+    def __init__(
+        self,
+        context: zmq.Context[Any],
+        port: int,
+        own: KeyPair,
+        peer: Peer,
+        names: frozenset[str],
+        beat_s: float = IMAGES_BEAT_S,
+    ) -> None:
         self.names = names
+        self.clock = ClockOffset()
         self.rejected = 0
         self.round_trip_s = float("nan")
-        self.latest_s = 0.0
+        self.confirmed_ns = 0
+        self._latest_s = 0.0
         self._best_s = float("-inf")
+        self._beat_s, self._beat_due_s, self._want_due_s = beat_s, 0.0, 0.0
         self.socket: zmq.Socket[Any] = context.socket(zmq.DEALER)
         self.socket.setsockopt_string(zmq.CURVE_SERVERKEY, peer.key)
         self.socket.setsockopt_string(zmq.CURVE_PUBLICKEY, own.public)
         self.socket.setsockopt_string(zmq.CURVE_SECRETKEY, own.secret)
         self.socket.setsockopt(zmq.RCVHWM, 1000)
+        self.socket.setsockopt(zmq.IMMEDIATE, 1)  # what cannot be sent now would be of no use later
         self.socket.setsockopt(zmq.RECONNECT_IVL, 50)
         self.socket.setsockopt(zmq.RECONNECT_IVL_MAX, 500)
         _keep_alive(self.socket)
@@ -203,11 +222,18 @@ class Request:
     @property
     def is_up(self) -> bool:
         """Whether the host replies."""
-        return time.monotonic() - self.latest_s < LOST_S
+        return time.monotonic() - self._latest_s < LOST_S
 
-    def ask(self) -> None:
-        """Asks for the topics; the reply measures the way there and back."""
-        self.send(WANT, _TIME.pack(time.monotonic_ns()), "\n".join(sorted(self.names)).encode())
+    def ask(self) -> float:
+        """Asks for the topics, and how late it is there, if that is due; returns when it is due again, s."""
+        now_s = time.monotonic()
+        if now_s >= self._beat_due_s:  # first: no message comes before the clock there is known
+            self._beat_due_s = now_s + self._beat_s
+            self.send(BEAT, _TIME.pack(time.monotonic_ns()))
+        if now_s >= self._want_due_s:
+            self._want_due_s = now_s + WANT_S
+            self.send(WANT, "\n".join(sorted(self.names)).encode())
+        return min(self._beat_due_s, self._want_due_s)
 
     def send(self, *frames: bytes) -> None:
         """Sends, unless the connection is down and too much waits already."""
@@ -218,8 +244,8 @@ class Request:
         """What has come in: name on the bus, header, payload."""
         while can_read(self.socket):
             frames = self.socket.recv_multipart(zmq.NOBLOCK)
-            if frames[0] == BEAT and len(frames) == 2 and len(frames[1]) == _TIME.size:
-                self._measure(*_TIME.unpack(frames[1]))
+            if frames[0] == BEAT and [len(frame) for frame in frames[1:]] == [_TIME.size] * 2:
+                self._measure(*_TIME.unpack(frames[1]), *_TIME.unpack(frames[2]))
                 continue
             name, mark, header = frames[1].partition(b"\0") if len(frames) == 3 else (b"", b"", b"")
             if frames[0] != MESSAGE or not mark or name.decode("utf-8", "replace") not in self.names:
@@ -233,11 +259,16 @@ class Request:
         """Closes the socket."""
         self.socket.close(linger=200)
 
-    def _measure(self, sent_ns: int) -> None:
-        self.latest_s = time.monotonic()
-        round_trip_s = self.latest_s - 1e-9 * sent_ns
-        if not round_trip_s > self.round_trip_s or self.latest_s - self._best_s > 10.0:
-            self._best_s, self.round_trip_s = self.latest_s, round_trip_s
+    def _measure(self, sent_ns: int, there_ns: int) -> None:
+        now_ns = time.monotonic_ns()
+        if not 0 < sent_ns <= now_ns:
+            self.rejected += 1
+            return
+        self._latest_s, round_trip_s = 1e-9 * now_ns, 1e-9 * (now_ns - sent_ns)
+        self.confirmed_ns = max(sent_ns, self.confirmed_ns)
+        self.clock.add(sent_ns, there_ns, now_ns)
+        if not round_trip_s > self.round_trip_s or self._latest_s - self._best_s > 10.0:
+            self._best_s, self.round_trip_s = self._latest_s, round_trip_s
 
 
 def _keep_alive(socket: zmq.Socket[Any]) -> None:

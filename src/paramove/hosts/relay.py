@@ -1,9 +1,11 @@
 """Forwards the topics that cross between this host and others, each once per host, as they are.
 
 A topic's messages keep epoch and sequence of their publisher, so that a subscriber on another host counts what is lost
-exactly as one on the same host. Images have a connection of their own, so that they never delay a stop, and only the
-latest one waits for a slow link. In lockstep the members' answers cross as well: the simulator's host watches the relay
-in place of a member, and the relay on the member's host reports its end.
+exactly as one on the same host. Times become those of this host's clock. What a person requests at another host is
+published as the relay's own, as the topic is this host's persons'. While the hosts reply from which the arm's commands
+come, the relay reports that to the arm's driver. Images have a connection of their own, so that they never delay a
+stop, and only the latest one waits for a slow link. In lockstep the members' answers cross as well: the simulator's
+host watches the relay in place of a member, and the relay on the member's host reports its end.
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ from paramove.bus import (
     Topic,
     answers_socket,
     can_read,
+    is_logged,
     member_mark,
     member_socket,
     pack,
@@ -39,14 +42,17 @@ from paramove.bus import (
     topics,
     unpack,
 )
+from paramove.hosts.clock_offset import ClockOffset
 from paramove.hosts.keys import HostKeyError, HostKeys
 from paramove.hosts.link import BEAT_S, DONE, MAX_ASKED_BYTES, MESSAGE, TAKEN, Asker, Gatekeeper, Offer, Request
+from paramove.hosts.own_time import LARGEST_BOUND_NS, UnknownTimeError, in_own_time
 from paramove.hosts.settings import RelaySettings
 from paramove.msgs.clock_pb2 import TickDone, TopicMark
+from paramove.msgs.safety_state_pb2 import LinkState
 
 UNDER_WAY = 2
 """Images of a topic on their way to a host at once."""
-_POLL_MS = 20
+_LONGEST_POLL_S = 0.02
 _LOOK_S = 0.25
 _log = logging.getLogger(__name__)
 
@@ -92,12 +98,16 @@ class Relay:
                 self._sources.setdefault(name, _Source(self._here, bus.settings.folder, rows[name], name))
             images = frozenset(name for name in peer.gives if rows[name].is_image)
             self._requests[host] = (
-                Request(away, peer.port, own, peer, frozenset(peer.gives) - images),
+                Request(away, peer.port, own, peer, frozenset(peer.gives) - images, BEAT_S),
                 Request(away, peer.port + 1, own, peer, images),
             )
         self._answers = _Answers(self._here, bus) if settings.clock_from else None
         self._members: dict[str, zmq.Socket[Any]] = {}
-        self._ask_due_s = self._look_due_s = self._detail_due_s = 0.0
+        self._real_time = bus.settings.clock == "monotonic"
+        self._latest: dict[tuple[str, str], tuple[int, int]] = {}
+        self._link = LinkState(hosts=sorted(host for host, peer in settings.peers.items() if peer.commands))
+        self._confirmed_ns = 0
+        self._look_due_s = self._detail_due_s = 0.0
         self.detail = ""
         sockets = [source.socket for source in self._sources.values()] + [offer.socket for offer in self._offers]
         sockets += [request.socket for request in self._each_request()]
@@ -124,29 +134,37 @@ class Relay:
 
     @property
     def trouble(self) -> str:
-        """Which links are down; "" if none is."""
+        """Which links are down, and of which hosts the clock is not known well; "" if there are none."""
         down = [host for host, (request, _) in self._requests.items() if not request.is_up]
-        return f"no link to {', '.join(down)}" if down else ""
+        if down:
+            return f"no link to {', '.join(down)}"
+        now_ns, allowed_ms = time.monotonic_ns(), 1e-6 * LARGEST_BOUND_NS
+        bounds_ms = {host: 1e-6 * data.clock.bound_ns(now_ns) for host, (data, _) in self._requests.items()}
+        return "; ".join(
+            f"the clock of {host} is known to {bound_ms:.0f} ms, allowed {allowed_ms:g} ms: its commands are rejected"
+            for host, bound_ms in bounds_ms.items()
+            if self._real_time and bound_ms > allowed_ms
+        )
 
     def _links(self) -> str:
         rejected = self._gate.rejected + sum(offer.rejected for offer in self._offers)
         rejected += sum(request.rejected for request in self._each_request())
-        links = [f"{host}: {_milliseconds(data.round_trip_s)}" for host, (data, _) in sorted(self._requests.items())]
+        links = [
+            f"{host}: {_milliseconds(data.round_trip_s)}{_about(data.clock) if self._real_time else ''}"
+            for host, (data, _) in sorted(self._requests.items())
+        ]
         more = [f"{rejected} rejected"] if rejected else []
         blocked = sum(offer.blocked for offer in self._offers)
         return ", ".join([*links, *more, *([f"{blocked} lost on a slow link"] if blocked else [])])
 
     def step(self) -> None:
         """Waits for something to forward, at most 20 ms, and forwards all that there is."""
+        due_s = min(request.ask() for request in self._each_request())
         now_s = time.monotonic()
-        if now_s >= self._ask_due_s:
-            self._ask_due_s = now_s + BEAT_S
-            for request in self._each_request():
-                request.ask()
         if now_s >= self._look_due_s:
             self._look_due_s = now_s + _LOOK_S
             self._look_after()
-        ready = {socket for socket, _ in self._poller.poll(_POLL_MS)}
+        ready = {socket for socket, _ in self._poller.poll(round(1e3 * min(max(0.0, due_s - now_s), _LONGEST_POLL_S)))}
         for publisher in self._publishers.values():
             if publisher.socket in ready:
                 publisher.serve()
@@ -165,6 +183,7 @@ class Relay:
             for request in requests:
                 for name, header, payload in request.messages() if request.socket in ready else ():
                     self._publish(request, host, name, header, payload)
+        self._report_link()
         if self._answers is not None and self._settings.clock_from is not None:
             for header, payload in self._answers.collect():
                 self._requests[self._settings.clock_from][0].send(DONE, header, payload)
@@ -235,20 +254,47 @@ class Relay:
 
     def _publish(self, request: Request, host: str, name: str, header: bytes, payload: bytes) -> None:
         topic = self._topics[name]
+        away = topics.AWAY.get(topic.name)
+        now_ns, message = time.monotonic_ns(), None
         try:
             envelope = unpack(header, payload, schema_hash(topic.type), topic.max_bytes)
-        except RejectedError as error:
+            if topic.is_image and not envelope.is_welcome:
+                request.send(TAKEN, name.encode())
+            if self._real_time and envelope.has_message:
+                clock = self._requests[host][0].clock
+                envelope, message = in_own_time(topic, envelope, payload, clock, now_ns)
+                payload = message.SerializeToString(deterministic=True)
+            elif away is not None and envelope.has_message:
+                message = topic.type.FromString(payload)
+        except (RejectedError, DecodeError, UnknownTimeError) as error:
             request.rejected += 1
-            _log.warning("topic %s: message from %s rejected: %s", name, host, error)
+            if is_logged(request.rejected):
+                _log.warning("topic %s: message from %s rejected: %s (number %d)", name, host, error, request.rejected)
             return
-        if topic.is_image and not envelope.is_welcome:
-            request.send(TAKEN, name.encode())
+        if away is None:
+            self._publisher(topic, name).forward(envelope._replace(flags=envelope.flags & ~FLAG_RING), payload)
+        elif message is not None and self._latest.get((host, name)) != (envelope.epoch, envelope.sequence):
+            self._latest[host, name] = envelope.epoch, envelope.sequence  # a new link repeats the last one
+            self._publisher(away, away.name).publish(message, envelope.captured_ns, now_ns)
+
+    def _publisher(self, topic: Topic, name: str) -> Publisher:
         if name not in self._publishers:
             publisher = Publisher(self._here, self._bus.settings.folder, topic, self._bus.node, name)
             self._owned.callback(publisher.ownership.release)
             self._publishers[name] = publisher
             self._poller.register(publisher.socket, zmq.POLLIN)
-        self._publishers[name].forward(envelope._replace(flags=envelope.flags & ~FLAG_RING), payload)
+        return self._publishers[name]
+
+    # -- the link as a part of the arm's safety -----------------------------------------------------------------------
+
+    def _report_link(self) -> None:
+        """Once all hosts that command have answered a later request."""
+        confirmed_ns = min((self._requests[host][0].confirmed_ns for host in self._link.hosts), default=0)
+        if confirmed_ns > self._confirmed_ns:
+            self._confirmed_ns = confirmed_ns
+            self._link.captured.FromNanoseconds(confirmed_ns)
+            topic = topics.HOSTS_LINK
+            self._publisher(topic, topic.name).publish(self._link, confirmed_ns, time.monotonic_ns())
 
 
 def _milliseconds(round_trip_s: float) -> str:
@@ -256,6 +302,15 @@ def _milliseconds(round_trip_s: float) -> str:
     if not math.isfinite(round_trip_s):
         return "no reply yet"
     return f"replies within {math.ceil(1e3 * round_trip_s)} ms"
+
+
+def _about(clock: ClockOffset) -> str:
+    now_ns, drift = time.monotonic_ns(), clock.drift
+    bound_ns = clock.bound_ns(now_ns)
+    if not math.isfinite(bound_ns):
+        return ""
+    drifts = "" if drift is None else f", drift {1e6 * drift[0]:+.0f} ± {1e6 * drift[1]:.0f} ppm"
+    return f", clock {1e-9 * clock.offset_ns(now_ns):+.3f} s ± {math.ceil(1e-6 * bound_ns)} ms{drifts}"
 
 
 class _Source:

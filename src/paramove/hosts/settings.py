@@ -16,6 +16,7 @@ class Peer(BaseModel):
         key: Its public key.
         wants: Topics that it gets from here: name on the bus -> row of the table.
         gives: Topics that come from there, likewise.
+        commands: Whether the arm's commands come from there, so that the arm stops when the link is lost.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -25,6 +26,7 @@ class Peer(BaseModel):
     key: str
     wants: dict[str, str] = Field(default_factory=dict)
     gives: dict[str, str] = Field(default_factory=dict)
+    commands: bool = False
 
 
 class RelaySettings(BaseModel):

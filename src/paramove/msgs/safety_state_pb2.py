@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n paramove/msgs/safety_state.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xf8\x02\n\x0bSafetyState\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12/\n\x05state\x18\x02 \x01(\x0e\x32 .paramove.msgs.SafetyState.State\x12*\n\x06\x66\x61ults\x18\x03 \x03(\x0b\x32\x1a.paramove.msgs.SafetyFault\x12\x16\n\x0elimited_frames\x18\x04 \x01(\x04\x12\x1d\n\x15rejected_trajectories\x18\x05 \x01(\x04\"\x90\x01\n\x05State\x12\x15\n\x11STATE_UNSPECIFIED\x10\x00\x12\x16\n\x12STATE_DISCONNECTED\x10\x01\x12\x12\n\x0eSTATE_DISARMED\x10\x02\x12\x0f\n\x0bSTATE_ARMED\x10\x03\x12\x12\n\x0eSTATE_STOPPING\x10\x04\x12\x0e\n\nSTATE_HOLD\x10\x05\x12\x0f\n\x0bSTATE_ESTOP\x10\x06R\x14refused_trajectories\"D\n\x0bSafetyFault\x12\x0c\n\x04\x63ode\x18\x01 \x01(\t\x12\r\n\x05joint\x18\x02 \x01(\t\x12\x0e\n\x06\x64\x65tail\x18\x03 \x01(\tR\x08sentence\"|\n\nArmRequest\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0e\n\x06source\x18\x02 \x01(\t\x12\r\n\x05\x61rmed\x18\x03 \x01(\x08\x12\x0e\n\x06reason\x18\x04 \x01(\t\x12\x11\n\tby_person\x18\x05 \x01(\x08\"K\n\x0bStopRequest\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0e\n\x06source\x18\x02 \x01(\tb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n paramove/msgs/safety_state.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xf8\x02\n\x0bSafetyState\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12/\n\x05state\x18\x02 \x01(\x0e\x32 .paramove.msgs.SafetyState.State\x12*\n\x06\x66\x61ults\x18\x03 \x03(\x0b\x32\x1a.paramove.msgs.SafetyFault\x12\x16\n\x0elimited_frames\x18\x04 \x01(\x04\x12\x1d\n\x15rejected_trajectories\x18\x05 \x01(\x04\"\x90\x01\n\x05State\x12\x15\n\x11STATE_UNSPECIFIED\x10\x00\x12\x16\n\x12STATE_DISCONNECTED\x10\x01\x12\x12\n\x0eSTATE_DISARMED\x10\x02\x12\x0f\n\x0bSTATE_ARMED\x10\x03\x12\x12\n\x0eSTATE_STOPPING\x10\x04\x12\x0e\n\nSTATE_HOLD\x10\x05\x12\x0f\n\x0bSTATE_ESTOP\x10\x06R\x14refused_trajectories\"D\n\x0bSafetyFault\x12\x0c\n\x04\x63ode\x18\x01 \x01(\t\x12\r\n\x05joint\x18\x02 \x01(\t\x12\x0e\n\x06\x64\x65tail\x18\x03 \x01(\tR\x08sentence\"|\n\nArmRequest\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0e\n\x06source\x18\x02 \x01(\t\x12\r\n\x05\x61rmed\x18\x03 \x01(\x08\x12\x0e\n\x06reason\x18\x04 \x01(\t\x12\x11\n\tby_person\x18\x05 \x01(\x08\"H\n\tLinkState\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05hosts\x18\x02 \x03(\t\"K\n\x0bStopRequest\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0e\n\x06source\x18\x02 \x01(\tb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -40,6 +40,8 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_SAFETYFAULT']._serialized_end=531
   _globals['_ARMREQUEST']._serialized_start=533
   _globals['_ARMREQUEST']._serialized_end=657
-  _globals['_STOPREQUEST']._serialized_start=659
-  _globals['_STOPREQUEST']._serialized_end=734
+  _globals['_LINKSTATE']._serialized_start=659
+  _globals['_LINKSTATE']._serialized_end=731
+  _globals['_STOPREQUEST']._serialized_start=733
+  _globals['_STOPREQUEST']._serialized_end=808
 # @@protoc_insertion_point(module_scope)

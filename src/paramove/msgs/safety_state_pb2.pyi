@@ -61,6 +61,14 @@ class ArmRequest(_message.Message):
     by_person: bool
     def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., source: _Optional[str] = ..., armed: bool = ..., reason: _Optional[str] = ..., by_person: bool = ...) -> None: ...
 
+class LinkState(_message.Message):
+    __slots__ = ("captured", "hosts")
+    CAPTURED_FIELD_NUMBER: _ClassVar[int]
+    HOSTS_FIELD_NUMBER: _ClassVar[int]
+    captured: _timestamp_pb2.Timestamp
+    hosts: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., hosts: _Optional[_Iterable[str]] = ...) -> None: ...
+
 class StopRequest(_message.Message):
     __slots__ = ("captured", "source")
     CAPTURED_FIELD_NUMBER: _ClassVar[int]

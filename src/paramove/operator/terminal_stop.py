@@ -35,12 +35,12 @@ def stop_arm(folder: Path, source: str, timeout_s: float) -> SafetyState | None:
     request.captured.FromNanoseconds(time.monotonic_ns())
     with BusVisitor(folder, "estop") as bus:
         publishers = []
-        for topic in topics.STOPS:
+        for topic in topics.PERSONS_STOPS:
             with contextlib.suppress(TopicTakenError):
                 publishers.append(bus.publisher(topic))
         if not publishers:
             raise TopicTakenError(
-                f"other programs already publish {' and '.join(topic.name for topic in topics.STOPS)}"
+                f"other programs already publish {' and '.join(topic.name for topic in topics.PERSONS_STOPS)}"
             )
         gate = bus.subscriber(topics.ARM_SAFETY)
         while time.monotonic() < end_s:

@@ -1,9 +1,10 @@
 """One host's part of a run that another host has launched: starts, ends and reports its nodes on request.
 
 It reads and writes lines of JSON by its standard input and output, which the launcher's ssh connects. Where the
-connection ends, or is silent for `SILENT_S`, it ends its nodes by itself, the arm first. From the launcher:
+connection ends, or is silent for `SILENT_S`, it ends its nodes by itself, the arm first. It begins with a line. From
+the launcher:
 
-    {"begin": {…}}                     the launch file, the domain, the release; once
+    {"begin": {…}}                     the launch file, the domain, the release, the age of the run; once, on that line
     {"start": NODE, "nice": N}         the answer is "started", or "failed"
     {"end": NODE}, {"kill": NODE}      SIGTERM, SIGKILL
     {}                                 it is alive; twice a second
@@ -105,9 +106,11 @@ class Agent:
 
     def run(self) -> bool:
         """Whether it could begin."""
+        self._say()
         begin = self._first()
         if begin is None:
             return False
+        begun_ns = time.monotonic_ns() - int(begin["age_ns"])
         release = release_of(self._workspace)
         if begin["release"] != release:
             self._say(rejected=f"it has {release}; the launcher has {begin['release']}. Install the same on both")
@@ -119,6 +122,7 @@ class Agent:
             with held_domain(begin["domain"], f"paramove host agent for {begin['launcher']}") as domain:
                 runs = self._workspace.root / "runs"
                 self._folder = RunFolder.create(runs, datetime.datetime.now().astimezone())
+                self._folder.begun_ns = begun_ns
                 self._folder.write_effective(launch)
                 self._folder.write_configs(launch, domain.folder, domain.truth_folder, begin["clock"], begin["host"])
                 self._say(ready=str(self._folder.path))

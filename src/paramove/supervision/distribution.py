@@ -23,6 +23,9 @@ SSH = ("ssh", "-o", "BatchMode=yes", "-o", "ConnectTimeout=10", "-o", "ServerAli
 STAYS = ("wire/", "truth/")
 """Topics that connect a robot, or the truth about it, with the process that drives or judges it: on one host."""
 
+LINK_TIMEOUT_S = 0.08
+"""Without a reply from a host for so long, its commands count as lost: stopping has begun within 0.1 s."""
+
 Crossing = dict[tuple[str, str], dict[str, str]]
 """(from, to) -> name on the bus -> row of the table of topics."""
 
@@ -51,18 +54,28 @@ def crossing(launch: Launch, interfaces: Mapping[str, Interface]) -> Crossing:
     """Which topics cross from which host to which.
 
     The status of each node, and what nobody on the bus publishes but a person's terminal, cross to and from the
-    launcher's host.
+    launcher's host. A person's stop crosses from every host to the arm's driver, an arming request from those that may
+    arm, and the answer to all of them.
     """
     own = own_host(launch.file) or ""
     host = {name: node.host or own for name, node in launch.file.nodes.items()}
+    arming = {name for name, its in launch.file.hosts.items() if (name == own if its.may_arm is None else its.may_arm)}
     publisher = {on_bus(launch, name, topic): host[name] for name, its in interfaces.items() for topic in its.publishes}
     found: Crossing = defaultdict(dict)
     for name, interface in interfaces.items():
         for topic in interface.subscribes:
             subscribed = on_bus(launch, name, topic)
-            here = publisher.get(subscribed, own)
-            if here != host[name]:
+            sources = {publisher.get(subscribed, own)}
+            if topic in _BY_RELAYS:
+                sources = set()
+            elif topic.name in topics.AWAY and subscribed not in publisher and topics.ARM_SAFETY in interface.publishes:
+                sources = arming if topic == topics.OPERATOR_ARM else {*launch.file.hosts}
+            for here in sources - {host[name]}:
                 found[here, host[name]][subscribed] = topic.name
+        if topics.ARM_SAFETY in interface.publishes:
+            safety = on_bus(launch, name, topics.ARM_SAFETY)
+            for other in {*launch.file.hosts} - {host[name]}:
+                found[host[name], other][safety] = topics.ARM_SAFETY.name
         if CLOCK in interface.publishes:
             for other in {*host.values()} - {host[name]}:
                 found[host[name], other][CLOCK.name] = CLOCK.name
@@ -87,8 +100,10 @@ def wrong_hosts(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator
         found = ", ".join(own) or "none"
         yield launch.error(("hosts",), f"one host without `ssh` expected, that of the launcher; found {found}")
         return
-    if not file.bus.lockstep:
-        message = "hosts need 'bus: {clock: simulated, lockstep: true}': their clocks are not compared yet"
+    if file.bus.clock == "simulated" and not file.bus.lockstep:
+        message = (
+            "hosts need 'clock: monotonic', or 'lockstep: true': simulated time that waits for nobody does not cross"
+        )
         yield launch.error(("hosts",), message)
     for (here, there), names in crossing(launch, interfaces).items():
         for name in names:
@@ -124,25 +139,40 @@ def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostK
     for name, host in file.hosts.items():
         others = {
             other: peer.model_copy(
-                update={"wants": crosses.get((name, other), {}), "gives": crosses.get((other, name), {})}
+                update={
+                    "wants": crosses.get((name, other), {}),
+                    "gives": crosses.get((other, name), {}),
+                    "commands": not file.bus.lockstep
+                    and not _COMMANDS.isdisjoint(crosses.get((other, name), {}).values()),
+                }
             )
             for other, peer in peers.items()
             if crosses.get((name, other)) or crosses.get((other, name))
         }
         if not others:
             continue
-        settings = RelaySettings(
-            address=peers[name].address, port=host.port, peers=others, clock_from=None if name == clock else clock
-        )
+        clock_from = clock if file.bus.lockstep and name != clock else None
+        settings = RelaySettings(address=peers[name].address, port=host.port, peers=others, clock_from=clock_from)
+        for node, its in interfaces.items():
+            is_here = (file.nodes[node].host or own) == name
+            if is_here and topics.HOSTS_LINK in its.subscribes and any(peer.commands for peer in others.values()):
+                limit = {"link_timeout_s": LINK_TIMEOUT_S, **file.nodes[node].parameters}
+                nodes[node] = nodes[node].model_copy(update={"parameters": limit})
         nodes[_relay(name)] = NodeSettings(
             module="nodes.relay",
             parameters=settings.model_dump(mode="json", exclude_none=True),
             host=None if name == own else name,
             lockstep=False,
-            restart="never",  # time does not wait for members whose relay has ended, so the run could not go on
+            # Lockstep does not wait for members whose relay has ended, so the run could not go on.
+            restart="never" if file.bus.lockstep else "on-failure",
+            priority="high",
             stop="last",
         )
     return replace(launch, file=file.model_copy(update={"nodes": nodes}))
+
+
+_COMMANDS = frozenset(topic.name for topic in (topics.ARM_TRAJECTORY, *topics.ARMINGS))
+_BY_RELAYS = (*topics.AWAY.values(), topics.HOSTS_LINK)
 
 
 def _relay(host: str) -> str:

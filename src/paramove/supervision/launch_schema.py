@@ -51,6 +51,9 @@ class HostSettings(_Checked):
     port: int = Field(default=47110, ge=1024, le=65534, description="TCP port of its relay; images take the next one")
     folder: str | None = Field(default=None, description="where paramove is started there; null: the home folder")
     command: str = Field(default="paramove", description="how paramove is started there")
+    may_arm: bool | None = Field(
+        default=None, description="whether a person may arm the robot from there; null: from the launcher's host only"
+    )
 
 
 class NodeSettings(_Checked):

@@ -55,7 +55,7 @@ class RemoteHost:
         assert self._process.stdout is not None
         self._lines = Lines(self._process.stdout.fileno())
         self._latest_s = self._alive_due_s = time.monotonic()
-        self.send(begin={**begin, "host": name})
+        self._begin: dict[str, Any] | None = {**begin, "host": name}
         end_s = time.monotonic() + BEGIN_S
         while "ready" not in self._answers and not self.lost and time.monotonic() < end_s:
             select.select([self.descriptor], [], [], ALIVE_S)
@@ -82,7 +82,7 @@ class RemoteHost:
             for process in self._processes.values():
                 process.has_ended(LOST)
             self._processes.clear()
-        if not self.lost and now_s >= self._alive_due_s:
+        if self._begin is None and not self.lost and now_s >= self._alive_due_s:
             self._alive_due_s = now_s + ALIVE_S
             self.send()
 
@@ -120,6 +120,10 @@ class RemoteHost:
             self._process.wait()
 
     def _take(self, line: dict[str, Any]) -> None:
+        if self._begin is not None:  # not before the agent reads: the age would have grown
+            age_ns = time.monotonic_ns() - self._folder.begun_ns
+            self.send(begin={**self._begin, "age_ns": age_ns})
+            self._begin = None
         for word in ("ready", "rejected"):
             if word in line:
                 self._answers[word] = line

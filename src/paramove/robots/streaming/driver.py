@@ -16,7 +16,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.documents import Floats
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
-from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
+from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, SafetyFault, SafetyState, StopRequest
 from paramove.robots import RobotDescription
 from paramove.robots.streaming.execution import Execution
 from paramove.robots.streaming.robot_report import RobotReport
@@ -78,6 +78,8 @@ class ArmDriver:
         clearance: For the gate; None: it does not check how near parts of the robot come to each other.
         no_program: Called whenever a program requests to arm: why none may; "" only where it is verified that the
             launch of this driver emulates the robot.
+        link_timeout_s: When commands come from another host: after so long without a reply from there the link counts
+            as lost, which stops the robot, and nobody arms. None: there is no other host.
 
     The driver begins with its first tick and ignores arming requests, stops and trajectories from before it. So a
     restarted driver is disarmed, and what stopped an earlier one is not its reason; the stream's epoch is made of that
@@ -90,8 +92,11 @@ class ArmDriver:
         settings: SafetySettings | None = None,
         clearance: Clearance | None = None,
         no_program: Callable[[], str] = lambda: Inputs.no_program,
+        link_timeout_s: float | None = None,
     ) -> None:
         self._description = description
+        self._link_timeout_s = link_timeout_s
+        self._link: tuple[int | None, str] = (None, "the other host")
         self._no_program = no_program
         self._settings = settings
         self._clearance = clearance
@@ -157,6 +162,14 @@ class ArmDriver:
         fault = Fault(PERSON_STOP, "", f"stopped from the {message.source or 'bus'} by a person")
         self._person_stops.append((captured_ns, fault))
 
+    def on_link(self, message: LinkState, captured_ns: int) -> None:
+        """Take that the other hosts have answered a request that was sent at `captured_ns`."""
+        self._link = captured_ns, ", ".join(message.hosts)
+
+    def is_cut_off(self, now_ns: int) -> bool:
+        """Whether the next `tick` stops the robot because the link to another host is lost."""
+        return self._core.state is State.ARMED and self._fault_of_link(now_ns) is not None
+
     @property
     def wants_to_arm(self) -> bool:
         """Whether a request waits for the next `tick` that may arm."""
@@ -198,11 +211,15 @@ class ArmDriver:
         requests: list[ArmingRequest | None] = [*self._arming_requests] or [None]
         self._arming_requests.clear()
         measured = self._report.measured(self._writer.epoch) if self._report else None
+        cut_off = self._fault_of_link(now_ns)
         stop = self._stop or self._fault_of_stall(stalled_s) or self._fault_of_stream(now_ns)
+        if self._core.state is State.ARMED:
+            stop = stop or cut_off
+        arming_faults = self._arming_faults if cut_off is None else (*self._arming_faults, cut_off)
         proposal = self._proposal(now_ns)
         targets = None
         for request in requests:
-            checks = self._arming_faults, self._emergency, self._checks_began_ns
+            checks = arming_faults, self._emergency, self._checks_began_ns
             by_program = request is not None and request.armed and not request.by_person
             no_program = self._why_no_program() if by_program else ""
             inputs = Inputs(measured, request, proposal, stop, *checks, no_program)
@@ -294,6 +311,19 @@ class ArmDriver:
             "old; the robot comes to rest by its stop ramp; arm again"
         )
         return Fault("driver_stalled", "", message)
+
+    def _fault_of_link(self, now_ns: int) -> Fault | None:
+        confirmed_ns, hosts = self._link
+        if self._link_timeout_s is None:
+            return None
+        age_ms, allowed_ms = float("inf"), 1e3 * self._link_timeout_s
+        if confirmed_ns is not None:
+            age_ms = 1e-6 * (now_ns - confirmed_ns)
+        if age_ms <= allowed_ms:
+            return None
+        since = "" if confirmed_ns is None else f" for {age_ms:.0f} ms"
+        message = f"no reply from {hosts}{since}, allowed {allowed_ms:.0f} ms: once the link is back, arm again"
+        return Fault("link_lost", "", message)
 
     def _fault_of_stream(self, now_ns: int) -> Fault | None:
         if self._execution is None or self._report is None or self._core.state is not State.ARMED:

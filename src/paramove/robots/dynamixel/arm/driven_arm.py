@@ -14,7 +14,7 @@ import numpy as np
 from paramove.bus import Topic, topics
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.motor_status_pb2 import MotorStatus
-from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
+from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, StopRequest
 from paramove.robots import RobotDescription
 from paramove.robots.dynamixel.arm.servo_arm import ServoArm
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
@@ -58,7 +58,9 @@ class DrivenArm:
             emergency_timeout_ms=EMERGENCY_MS if settings.stop_inputs.are_there else None,
         )
         self._caution, self._clock = settings.caution, port.clock
-        self._driver = ArmDriver(description, safety, self_collision(description), settings.why_no_program)
+        self._driver = ArmDriver(
+            description, safety, self_collision(description), settings.why_no_program, settings.link_timeout_s
+        )
         self.readable, self._written = os.pipe2(os.O_NONBLOCK)
         self._loop = ServoLoop(self._driver, description, servos, port, settings, self._wake)
         self._slow_ns = self._safety_ns = self._motors_ns = 0
@@ -104,6 +106,11 @@ class DrivenArm:
         """Take an arming request, to arm or disarm."""
         with self._loop.lock:
             self._driver.on_arm_request(message, captured_ns)
+
+    def on_link(self, message: LinkState, captured_ns: int) -> None:
+        """Take that the other hosts reply."""
+        with self._loop.lock:
+            self._driver.on_link(message, captured_ns)
 
     def on_stop(self, message: StopRequest, captured_ns: int) -> None:
         """Take a person's stop: the stop ramp begins in the next period."""

@@ -68,6 +68,7 @@ class LoopSettings:
         emulated_by: The launch that emulates the servos, which is verified at every open of the port; None:
             they count as real.
         caution: A message to show in any case.
+        link_timeout_s: See `ArmDriver`.
     """
 
     torque_off: bool = False
@@ -77,6 +78,7 @@ class LoopSettings:
     rest: Mapping[str, float] | None = None
     emulated_by: ThisLaunch | None = None
     caution: str = ""
+    link_timeout_s: float | None = None
 
     def why_no_program(self) -> str:
         """Why no program may arm the arm; "" if one may."""
@@ -220,8 +222,9 @@ class ServoLoop:
             self._reopen_s = self._now_s + REOPEN_S
             self._reader = None
             self._report(Fault("port_lost", "", f"{error} The arm rests by its servos' own watchdog; arm again"))
-        if self._urgent or self._step % self._tick_steps == 0:
-            self._tick(self._clock.now_ns)
+        now_ns = self._clock.now_ns
+        if self._urgent or self._step % self._tick_steps == 0 or self.driver.is_cut_off(now_ns):
+            self._tick(now_ns)
         self._step += 1
 
     def _look_at_emergency_stop(self) -> None:

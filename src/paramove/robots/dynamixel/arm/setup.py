@@ -60,6 +60,8 @@ class ServoArmSetup(OldNames):
         rest_deg: Where the arm can go limp without harm, degrees by joint; joints without stay where they are.
         emulated: Replaces `timeouts` where the driver verifies, at every open of the port, that this very
             launch emulates the servos; only then a program may arm them. None: they count as real in any case.
+        link_timeout_s: Commands come from another host, and without a reply from there for so long the arm stops; the
+            launcher sets it. None: there is no other host.
     """
 
     old_names = (("patience", "timeouts"),)
@@ -75,6 +77,7 @@ class ServoArmSetup(OldNames):
     stop_file: Path | None = None
     stop_line: Path | None = None
     stop_line_pressed: Literal[0, 1] = 1
+    link_timeout_s: Annotated[float, Field(gt=0.0, le=0.1)] | None = None
 
     def driven_arm(self, run_folder: Path, launch: ThisLaunch | None = None, paced_in: Path | None = None) -> DrivenArm:
         """The arm, not yet driven.
@@ -104,7 +107,14 @@ class ServoArmSetup(OldNames):
         faults = () if is_even or calibration is not None else uncalibrated(description)
         servos = joint_servos(description, calibration)
         stop_inputs = StopInputs(self.stop_file, self.stop_line, self.stop_line_pressed)
-        settings = LoopSettings(self.torque_off, timeouts, faults, stop_inputs, self._rest(description))
+        settings = LoopSettings(
+            self.torque_off,
+            timeouts,
+            faults,
+            stop_inputs,
+            self._rest(description),
+            link_timeout_s=self.link_timeout_s,
+        )
         if emulated is not None:
             settings = replace(settings, emulated_by=launch)
         elif self.emulated is not None:

@@ -1,0 +1,68 @@
+"""Messages of another host, in the time of this one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from google.protobuf.descriptor import Descriptor, FieldDescriptor  # type: ignore[import-untyped]
+
+from paramove.bus import Envelope, Topic, topics
+from paramove.hosts.clock_offset import ClockOffset
+
+LARGEST_BOUND_NS = 5_000_000
+"""Where the offset of a clock is known less well, nobody can tell how old a command is."""
+_TIMESTAMP = "google.protobuf.Timestamp"
+_timed: dict[str, bool] = {}
+
+
+class UnknownTimeError(Exception):
+    """Nobody can tell how old a message is."""
+
+
+def in_own_time(
+    topic: Topic, envelope: Envelope, payload: bytes, clock: ClockOffset, now_ns: int
+) -> tuple[Envelope, Any]:
+    """Envelope and message with all times by this host's clock.
+
+    Args:
+        topic: Row of the table.
+        envelope, payload: As they were published there.
+        clock: That of the other host.
+        now_ns: Time here.
+
+    Raises:
+        DecodeError: The payload is no message of the topic.
+        UnknownTimeError: No reply has shown what time it is there; or a command to move or arm, and the clock's offset
+            is not known to `LARGEST_BOUND_NS`.
+    """
+    message = topic.type.FromString(payload)
+    bound_ns = clock.bound_ns(now_ns)
+    moves = topic.type is topics.ARM_TRAJECTORY.type or (topic.type is topics.OPERATOR_ARM.type and message.armed)
+    if bound_ns == float("inf") or (moves and bound_ns > LARGEST_BOUND_NS):
+        raise UnknownTimeError(f"the clock there is known to {1e-6 * bound_ns:.1f} ms only, so its age is not known")
+    ahead_ns = clock.offset_ns(now_ns)
+    _set_back(message, ahead_ns)
+    times = envelope.published_ns - ahead_ns, envelope.captured_ns - ahead_ns
+    return envelope._replace(published_ns=times[0], captured_ns=times[1]), message
+
+
+def _set_back(message: Any, by_ns: int) -> None:
+    """Every time in a message and its parts."""
+    for field, value in message.ListFields() if _has_times(message.DESCRIPTOR) else ():
+        if field.message_type is None or not _has_times(field.message_type):
+            continue
+        for part in value if field.label == FieldDescriptor.LABEL_REPEATED else (value,):
+            if field.message_type.full_name == _TIMESTAMP:
+                part.FromNanoseconds(part.ToNanoseconds() - by_ns)
+            else:
+                _set_back(part, by_ns)
+
+
+def _has_times(kind: Descriptor) -> bool:
+    """Whether there is a time in messages of this type, or in a part of them."""
+    name = kind.full_name
+    if name not in _timed:
+        _timed[name] = name == _TIMESTAMP  # until its parts are known: a type may be a part of itself
+        parts = [field.message_type for field in kind.fields if field.message_type is not None]
+        _timed[name] |= any(_has_times(part) for part in parts)
+    return _timed[name]
