@@ -1,12 +1,8 @@
 """Arm driver: plays trajectories on HOAP-3 through the safety gate, and reports its joints.
 
 Subscribes  arm/trajectory         JointTrajectory        events
-            operator/arm           ArmRequest             events, latched
-            operator/arm_at_start  ArmRequest             events, latched
-            operator/stop          StopRequest            events, latched
-            operator/estop         StopRequest            events, latched
-            operator/arm_away      ArmRequest             events, latched; from other hosts
-            operator/stop_away     StopRequest            events, latched; from other hosts
+            operator/arm, operator/arm_at_start, operator/arm_away  ArmRequest   events, latched
+            operator/stop, operator/estop, operator/stop_away       StopRequest  events, latched
             hosts/link             LinkState              100 Hz, while other hosts reply
             wire/hoap3/state       Hoap3State             15 Hz   joint units
 Publishes   wire/hoap3/stream      StreamBatch            15 Hz while moving, joint units
@@ -37,11 +33,8 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the robot then comes to rest by the stop ramp that it already has."""
     launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
-    driver = ArmDriver(
-        RobotDescription.load(config.robot),
-        no_program=lambda: launch.why_no_program(bus.settings),
-        link_timeout_s=config.link_timeout_s,
-    )
+    robot, no_program = RobotDescription.load(config.robot), lambda: launch.why_no_program(bus.settings)
+    driver = ArmDriver(robot, no_program=no_program, link_timeout_s=config.link_timeout_s)
     handle: dict[topics.Topic, Any] = {topics.ARM_TRAJECTORY: driver.on_trajectory, topics.HOSTS_LINK: driver.on_link}
     handle |= {topics.WIRE_HOAP3_STATE: lambda message, at_ns: driver.on_robot_state(state_of(message), at_ns)}
     handle |= dict.fromkeys(topics.ARMINGS, driver.on_arm_request) | dict.fromkeys(topics.STOPS, driver.on_stop)

@@ -1,12 +1,8 @@
 """Servo arm driver: plays trajectories on an arm of Dynamixel servos through the safety gate, and reports its status.
 
 Subscribes  arm/trajectory          JointTrajectory        events
-            operator/arm            ArmRequest             events, latched
-            operator/arm_at_start   ArmRequest             events, latched
-            operator/stop           StopRequest            events, latched
-            operator/estop          StopRequest            events, latched
-            operator/arm_away       ArmRequest             events, latched; from other hosts
-            operator/stop_away      StopRequest            events, latched; from other hosts
+            operator/arm, operator/arm_at_start, operator/arm_away  ArmRequest   events, latched
+            operator/stop, operator/estop, operator/stop_away       StopRequest  events, latched
             hosts/link              LinkState              100 Hz, while other hosts reply
 Publishes   arm/joint_states        foxglove.JointStates   15 Hz   rad
             arm/joint_states/fast   foxglove.JointStates   100 Hz  rad
@@ -14,6 +10,8 @@ Publishes   arm/joint_states        foxglove.JointStates   15 Hz   rad
             arm/safety              SafetyState            15 Hz, latched
             arm/motors              MotorStatus            1 Hz
 """
+
+from typing import Any
 
 from paramove.bus import TICK_PERIOD_NS, Bus, NodeConfig, Tick, main, topics
 from paramove.robots import RobotFolder, ThisLaunch
@@ -37,12 +35,8 @@ def run(bus: Bus, config: Config) -> None:
     with config.driven_arm(bus.run_folder, launch, paced_in) as arm:
         bus.when_readable(arm.readable, lambda: publish_all(bus, arm))
         bus.ready(arm.detail)
-        handle = {
-            topics.ARM_TRAJECTORY: arm.on_trajectory,
-            topics.HOSTS_LINK: arm.on_link,
-            **dict.fromkeys(topics.ARMINGS, arm.on_arm_request),
-            **dict.fromkeys(topics.STOPS, arm.on_stop),
-        }
+        handle: dict[topics.Topic, Any] = {topics.ARM_TRAJECTORY: arm.on_trajectory, topics.HOSTS_LINK: arm.on_link}
+        handle |= dict.fromkeys(topics.ARMINGS, arm.on_arm_request) | dict.fromkeys(topics.STOPS, arm.on_stop)
         for event in bus.events(*SUBSCRIBES, tick=True):
             if isinstance(event, Tick):
                 arm.run_to(event.now_ns + TICK_PERIOD_NS)

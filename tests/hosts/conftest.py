@@ -8,7 +8,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 
@@ -29,9 +29,15 @@ def free_ports() -> int:
 
 
 class TwoHosts:
-    """`here` gives the topics of `gives`, `there` those of `back`; each has a folder of the bus and one of keys."""
+    """`here` gives the topics of `gives`, `there` those of `back`; each has a folder of the bus and one of keys.
 
-    def __init__(self, root: Path, gives: tuple[Topic, ...], back: tuple[Topic, ...] = ()) -> None:
+    In simulated time messages cross as they are; with `real_time` the commands of `there` come from `here`.
+    """
+
+    def __init__(
+        self, root: Path, gives: tuple[Topic, ...], back: tuple[Topic, ...] = (), real_time: bool = False
+    ) -> None:
+        self._clock: Literal["monotonic", "simulated"] = "monotonic" if real_time else "simulated"
         self._opened = contextlib.ExitStack()
         self.folders = {
             name: Path(self._opened.enter_context(tempfile.TemporaryDirectory())) for name in ("here", "there")
@@ -51,6 +57,7 @@ class TwoHosts:
                 key=self.keys[other].own().public,
                 wants=rows[0],
                 gives=rows[1],
+                commands=real_time and name == "there",
             )
             self.settings[name] = RelaySettings(
                 address="127.0.0.1", port=self.ports[name], peers={other: peer}, keys=self.keys[name].folder
@@ -60,7 +67,7 @@ class TwoHosts:
         """Starts the relays of these hosts, of both by default."""
         for name in names or self.folders:
             self._running[name] = self._opened.enter_context(contextlib.ExitStack())
-            bus = Bus(f"relay_{name}", BusSettings(folder=self.folders[name]))
+            bus = Bus(f"relay_{name}", BusSettings(folder=self.folders[name], clock=self._clock))
             self._running[name].callback(bus.close)
             self.relays[name] = self._running[name].enter_context(Relay(bus, self.settings[name]))
 
@@ -103,8 +110,10 @@ class TwoHosts:
 def two_hosts(tmp_path: Path) -> Iterator[Callable[..., TwoHosts]]:
     with contextlib.ExitStack() as opened:
 
-        def make(gives: tuple[Topic, ...], back: tuple[Topic, ...] = (topics.RULES,)) -> TwoHosts:
-            hosts = TwoHosts(tmp_path, gives, back)
+        def make(
+            gives: tuple[Topic, ...], back: tuple[Topic, ...] = (topics.RULES,), real_time: bool = False
+        ) -> TwoHosts:
+            hosts = TwoHosts(tmp_path, gives, back, real_time)
             opened.callback(hosts.close)
             return hosts
 

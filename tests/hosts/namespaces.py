@@ -48,7 +48,9 @@ class Namespaces:
                 pytest.skip("network namespaces need root")
             self._opened.callback(ip, "netns", "del", name)
         self._link = subprocess.Popen(
-            [sys.executable, __file__, str(self._seed), *self._devices], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            ["nice", "-n", "-15", sys.executable, __file__, str(self._seed), *self._devices],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
         )
         self._opened.callback(self._end_link)
         assert self._link.stdout is not None
@@ -84,8 +86,7 @@ class Namespaces:
 
     def _end_link(self) -> None:
         assert self._link.stdin is not None
-        self._link.stdin.close()
-        self._link.wait()
+        self._link.communicate()
 
 
 def _tun(name: str) -> int:
@@ -103,7 +104,8 @@ def _packets(descriptor: int) -> Iterator[bytes]:
 def forward(seed: int, first: str, second: str) -> None:
     """Packets between two TUN devices, until standard input ends."""
     ends = [_tun(first), _tun(second)]
-    print("ready", flush=True)
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
     draw, order = random.Random(seed), itertools.count()
     delay_s = jitter_s = loss = 0.0
     under_way: list[tuple[float, int, int, bytes]] = []

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import socket
+import struct
+import time
 
 import numpy as np
 import pytest
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.bus import topics
-from paramove.hosts import HostKeyError
+from paramove.hosts import HostKeyError, link
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.rule_pb2 import Rule, Rules, Speech
+from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
 
 
 def test_messages_arrive_as_they_were_published_each_once(two_hosts):
@@ -168,3 +172,90 @@ def test_a_link_that_was_cut_is_reported_and_made_anew(two_hosts):
     assert received.message.rules[0].object == "yellow"
     assert (subscriber.counter.messages, subscriber.counter.lost) == (2, 1)
     hosts.until(lambda: not hosts.relays["there"].trouble)
+
+
+@pytest.fixture
+def clock_ahead(monkeypatch):
+    """The clock of the relay that offers is 100 s ahead."""
+    sent = link.Offer.send
+
+    def send(self, asker, *frames):
+        if frames[0] == link.BEAT:
+            (time_ns,) = struct.unpack("<q", frames[2])
+            frames = (*frames[:2], struct.pack("<q", time_ns + 100_000_000_000))
+        return sent(self, asker, *frames)
+
+    monkeypatch.setattr(link.Offer, "send", send)
+
+
+def test_times_become_those_of_the_receiving_host(two_hosts, clock_ahead):
+    hosts = two_hosts((topics.SPEECH,), real_time=True)
+    published, subscriber = hosts.connected(topics.SPEECH)
+    before_ns = time.monotonic_ns()
+    speech = Speech(text="one")
+    speech.captured.FromNanoseconds(before_ns + 100_000_000_000)
+    published.publish(speech, before_ns + 100_000_000_000, before_ns + 100_000_000_007)
+    received = hosts.until(subscriber.receive)
+    assert abs(received.captured_ns - before_ns) < 1e9
+    assert received.published_ns - received.captured_ns == 7
+    assert received.message.captured.ToNanoseconds() == received.captured_ns
+    assert received.sequence == 1
+    hosts.until(lambda: "clock +100.000 s ± " in hosts.relays["there"].detail)
+
+
+def test_a_clock_that_is_not_known_well_is_reported_and_its_commands_are_rejected(two_hosts, monkeypatch):
+    hosts = two_hosts((topics.SPEECH, topics.ARM_TRAJECTORY), real_time=True)
+    published, subscriber = hosts.connected(topics.ARM_TRAJECTORY)
+    spoken = hosts.visitor("here").publisher(topics.SPEECH)
+    received = hosts.visitor("there").subscriber(topics.SPEECH)
+    hosts.until(lambda: received.welcomed, received.receive, spoken.serve)
+    monkeypatch.setattr("paramove.hosts.clock_offset.ClockOffset.bound_ns", lambda self, now_ns: 6e6)
+    there = hosts.relays["there"]
+    assert "clock of here" in there.trouble
+    now_ns = time.monotonic_ns()
+    published.publish(JointTrajectory(id="move"), now_ns, now_ns)
+    hosts.until(lambda: "1 rejected" in there.detail)
+    spoken.publish(Speech(text="one"), now_ns, now_ns)
+    assert hosts.until(received.receive).message.text == "one"
+    assert subscriber.receive() is None
+
+
+def test_the_driver_is_informed_for_as_long_as_the_host_that_commands_replies(two_hosts):
+    hosts = two_hosts((topics.ARM_TRAJECTORY,), real_time=True)
+    watch = hosts.visitor("there").subscriber(topics.HOSTS_LINK)
+    hosts.start()
+    first = hosts.until(watch.receive)
+    assert list(first.message.hosts) == ["here"]
+    second = hosts.until(watch.receive)
+    assert first.captured_ns < second.captured_ns <= time.monotonic_ns()
+    hosts.stop("here")
+    while watch.receive() is not None:  # what was on its way
+        pass
+    cut_ns = time.monotonic_ns()
+    hosts.until(lambda: time.monotonic_ns() > cut_ns + 300_000_000)
+    assert watch.receive() is None
+    hosts.start("here")
+    assert hosts.until(watch.receive).captured_ns > cut_ns
+
+
+def test_what_persons_request_elsewhere_leaves_the_topic_to_those_here(two_hosts):
+    hosts = two_hosts((topics.OPERATOR_ARM, topics.OPERATOR_STOP, topics.OPERATOR_ESTOP), real_time=True)
+    here, there = hosts.visitor("here"), hosts.visitor("there")
+    arms, stops = here.publisher(topics.OPERATOR_ARM), here.publisher(topics.OPERATOR_ESTOP)
+    armed, stopped = there.subscriber(topics.OPERATOR_ARM_AWAY), there.subscriber(topics.OPERATOR_STOP_AWAY)
+    hosts.start()
+    now_ns = time.monotonic_ns()
+    arms.publish(ArmRequest(source="terminal", armed=True, by_person=True), now_ns, now_ns)
+    received = hosts.until(armed.receive, arms.serve)
+    assert abs(received.captured_ns - now_ns) < 1e9
+    stops.publish(StopRequest(source="terminal"), now_ns, now_ns)
+    hosts.until(stopped.receive, stops.serve)
+    there.publisher(topics.OPERATOR_ARM)
+    there.publisher(topics.OPERATOR_ESTOP)
+    hosts.stop("here")
+    hosts.start("here")  # a link that is new repeats the latest values: nobody has requested anything
+    hosts.until(lambda: not hosts.relays["there"].trouble and not hosts.relays["here"].trouble)
+    begun_s = time.monotonic()
+    hosts.until(lambda: time.monotonic() > begun_s + 0.5, arms.serve, stops.serve)
+    assert armed.receive() is None
+    assert stopped.receive() is None

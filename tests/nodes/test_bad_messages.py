@@ -39,7 +39,7 @@ from paramove.cameras.frames import Frame, encode
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal
-from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
+from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, SafetyFault, SafetyState, StopRequest
 from paramove.objects.homography import PlaneHomography
 from paramove.observation import BodyKeyPoints, key_points_message
 from paramove.robots.hoap3.wire import state_message
@@ -225,7 +225,10 @@ def of_arm_driver() -> list[Event]:
     more: dict[int, Published] = {
         5: (topics.OPERATOR_ARM, ArmRequest(source="a person", armed=True, by_person=True)),
         6: (topics.OPERATOR_ARM_AT_START, ArmRequest(source="a program", armed=True)),
+        7: (topics.OPERATOR_ARM_AWAY, ArmRequest(source="a person elsewhere", armed=True, by_person=True)),
         8: (topics.ARM_TRAJECTORY, trajectory("one", {"right_elbow": -60.0}, 1.0)),
+        9: (topics.HOSTS_LINK, LinkState(hosts=["desk_pc"])),
+        49: (topics.OPERATOR_STOP_AWAY, StopRequest(source="terminal")),
         50: (topics.OPERATOR_STOP, StopRequest(source="a person")),
         51: (topics.OPERATOR_ESTOP, StopRequest(source="terminal")),
     }

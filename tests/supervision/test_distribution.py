@@ -31,11 +31,11 @@ def launch(tmp_path):
 
 def test_exactly_what_the_other_host_needs_crosses(launch):
     its = launch()
+    perceived = ("camera/image", "objects/tracked", "status/camera", "status/colour_tracker")
+    stops = ("operator/stop", "operator/estop")
     assert crossing(its, application.check(its, Workspace.here())) == {
-        ("robot_pc", "camera_pc"): {name: name for name in ("camera/image_raw", "clock")},
-        ("camera_pc", "robot_pc"): {
-            name: name for name in ("camera/image", "objects/tracked", "status/camera", "status/colour_tracker")
-        },
+        ("robot_pc", "camera_pc"): {name: name for name in ("camera/image_raw", "clock", "arm/safety")},
+        ("camera_pc", "robot_pc"): {name: name for name in (*perceived, *stops)},
     }
 
 
@@ -68,7 +68,7 @@ def test_each_host_gets_a_relay_that_knows_the_other_by_its_pinned_key(launch, t
     ("nodes", "overlays", "text", "words"),
     [
         ("camera: {host: camerapc}", (), OVERLAY, "camera_pc"),
-        (CAMERA, ("sim", "wall_clock"), OVERLAY, "lockstep"),
+        (CAMERA, ("sim",), "bus: {{lockstep: false}}" + OVERLAY, "lockstep"),
         (CAMERA, ("sim",), OVERLAY.replace("ssh: lab-cam, ", ""), "one host without `ssh`"),
         ("judge: {host: camera_pc}", ("sim",), OVERLAY, "truth/"),
     ],
@@ -79,12 +79,45 @@ def test_what_cannot_be_distributed_is_rejected(launch, nodes, overlays, text, w
         application.check(its, Workspace.here())
 
 
-def test_a_host_without_nodes_gets_no_relay(launch, tmp_path):
+def test_from_a_host_without_nodes_a_person_can_stop_the_arm(launch, tmp_path):
     keys = HostKeys(tmp_path / "keys")
     keys.trust("lab-cam", "k" * 40)
     its = launch("")
+    peers = distributed(its, application.check(its, Workspace.here()), keys).file.nodes["relay_robot_pc"].parameters
+    assert {*peers["peers"]["camera_pc"]["gives"]} == {"operator/stop", "operator/estop", "status/relay_camera_pc"}
+    assert {*peers["peers"]["camera_pc"]["wants"]} == {"arm/safety"}
+
+
+ARM_AWAY = """
+hosts:
+  desk_pc: {{address: 10.0.0.1}}
+  robot_pc: {{ssh: arm, address: 10.0.0.2}}
+  wall_pc: {{ssh: wall, address: 10.0.0.3, may_arm: {may_arm}}}
+after_run: null
+nodes: {{arm_driver: {{host: robot_pc}}, dynamixel_emulator: {{host: robot_pc}}, judge: null}}
+"""
+
+
+@pytest.mark.parametrize("may_arm", [True, False])
+def test_who_may_arm_may_move_and_may_stop_an_arm_on_another_host(tmp_path, may_arm):
+    """All of them stop it; the launcher's arms it, and another one that may; only the synthesizer's host moves it."""
+    keys, file = HostKeys(tmp_path / "keys"), tmp_path / "two.yaml"
+    for number, name in enumerate(("arm", "wall")):
+        keys.trust(name, str(number) * 40)
+    file.write_text(ARM_AWAY.format(may_arm=str(may_arm).lower()))
+    its = load(Workspace.here(), "dynamixel_arm", ["emulated", str(file)])
     nodes = distributed(its, application.check(its, Workspace.here()), keys).file.nodes
-    assert not [name for name in nodes if name.startswith("relay")]
+    peers = nodes["relay_robot_pc"].parameters["peers"]
+    desk, wall = {*peers["desk_pc"]["gives"]}, {*peers["wall_pc"]["gives"]}
+    assert desk == {
+        "arm/trajectory", "operator/arm", "operator/arm_at_start", "operator/stop", "operator/estop"
+    }  # fmt: skip
+    assert wall == {"operator/stop", "operator/estop", *(["operator/arm"] if may_arm else [])}
+    assert "arm/safety" in peers["wall_pc"]["wants"]
+    assert (peers["desk_pc"]["commands"], peers["wall_pc"]["commands"]) == (True, may_arm)
+    assert 0.0 < nodes["arm_driver"].parameters["link_timeout_s"] <= 0.1
+    assert "link_timeout_s" not in nodes["synthesizer"].parameters
+    assert nodes["relay_desk_pc"].restart == "on-failure"
 
 
 def test_a_robot_and_its_driver_need_one_host(tmp_path):

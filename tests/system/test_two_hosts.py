@@ -1,53 +1,72 @@
-"""Rule learning on two hosts, which are two network namespaces joined by a cable: the same run as on one."""
+"""Applications on two hosts, which are two network namespaces with clocks of their own."""
 
 from __future__ import annotations
 
 import json
-import os
+import logging
+import random
+import signal
 import subprocess
 import sys
+import threading
+import time
 from collections import defaultdict
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from paramove.recording.reader import read
+from tests.docs.terminal import at_terminal
+from tests.hosts.namespaces import CLOCK_AHEAD_S, HERE, THERE, Namespaces
 
 pytestmark = pytest.mark.long
 ROOT = Path(__file__).parents[2]
-STAND_IN = ROOT / "tests" / "supervision" / "ssh_stand_in.py"
-HERE, THERE = "10.99.0.1", "10.99.0.2"
-OVERLAY = """
+PARAMOVE = f"{sys.executable} -m paramove.cli.main"
+CAMERA_AWAY = f"""
 hosts:
-  robot_pc: {{address: {here}}}
-  camera_pc: {{ssh: camera-pc, address: {there}, folder: {root}, command: {python} -m paramove.cli.main}}
+  robot_pc: {{address: {HERE}}}
+  camera_pc: {{ssh: other, address: {THERE}, folder: {ROOT}, command: {PARAMOVE}}}
 nodes:
   camera: {{host: camera_pc}}
   colour_tracker: {{host: camera_pc}}
 """
-
-
-def ip(*words):
-    return subprocess.run(["ip", *words], capture_output=True, text=True, check=False)
+ARM_AWAY = f"""
+hosts:
+  desk_pc: {{address: {HERE}}}
+  robot_pc: {{ssh: other, address: {THERE}, folder: {ROOT}, command: {PARAMOVE}}}
+after_run: null
+nodes:
+  arm_driver: {{host: robot_pc}}
+  dynamixel_emulator: {{host: robot_pc}}
+  judge: null
+  reacher: {{required: false}}
+"""
+_log = logging.getLogger(__name__)
+STOP_LIMIT_S = 0.1
+STILL = np.deg2rad(0.2)
+FIRST_MOTION_S, LAST_MOTION_S = 4.0, 22.0
+"""After the launch, when the arm moves most of the time."""
 
 
 @pytest.fixture
-def namespaces():
-    """Names of two network namespaces that reach each other at `HERE` and `THERE`, and nothing else."""
-    names = [f"paramove_{side}_{os.getpid()}" for side in ("here", "there")]
-    if ip("netns", "add", names[0]).returncode:
-        pytest.skip("network namespaces need root")
-    try:
-        ip("netns", "add", names[1])
-        ip("link", "add", "pm_here", "netns", names[0], "type", "veth", "peer", "name", "pm_there", "netns", names[1])
-        for name, device, address in zip(names, ("pm_here", "pm_there"), (HERE, THERE), strict=True):
-            ip("-n", name, "addr", "add", f"{address}/24", "dev", device)
-            for one in (device, "lo"):
-                assert ip("-n", name, "link", "set", one, "up").returncode == 0
-        yield names
-    finally:
-        for name in names:
-            ip("netns", "del", name)
+def hosts(launcher, tmp_path):
+    """Two hosts; `launcher` starts on the first one, which the second trusts."""
+    with Namespaces() as hosts:
+        runtime = Path(launcher.environment["XDG_RUNTIME_DIR"], "there")
+        launcher.environment |= {"XDG_CONFIG_HOME": str(tmp_path / "config_here")}
+        launcher.environment |= hosts.ssh(tmp_path, runtime, tmp_path / "config_there")
+        trust = [*PARAMOVE.split(), "host", "trust", "other", "--folder", str(ROOT), "--command", PARAMOVE]
+        assert subprocess.run(trust, cwd=ROOT, env=launcher.environment, check=False).returncode == 0
+        launcher.within = hosts.within
+        yield hosts
+        assert hosts.processes() == [], "a process is left"
+
+
+def overlay(folder, text):
+    path = folder / "two_hosts.yaml"
+    path.write_text(text)
+    return str(path)
 
 
 def content(recording):
@@ -63,33 +82,93 @@ def content(recording):
     return {topic: [one for one in some if one[0] <= end_ns] for topic, some in messages.items()}
 
 
-def test_a_seed_is_the_same_run_on_one_host_and_on_two(launcher, namespaces, tmp_path):
-    here, there = namespaces
-    runtime = launcher.environment["XDG_RUNTIME_DIR"]
-    (tmp_path / "environment.json").write_text(
-        json.dumps({"XDG_RUNTIME_DIR": f"{runtime}/there", "XDG_CONFIG_HOME": str(tmp_path / "config_there")})
-    )
-    Path(runtime, "there").mkdir(mode=0o700)
-    launcher.environment |= {
-        "XDG_CONFIG_HOME": str(tmp_path / "config_here"),
-        "PARAMOVE_SSH": f"ip netns exec {there} {sys.executable} {STAND_IN} {tmp_path / 'environment.json'}",
-    }
-    command = f"{sys.executable} -m paramove.cli.main"
-    trusted = [*command.split(), "host", "trust", "camera-pc", "--folder", str(ROOT), "--command", command]
-    assert subprocess.run(trusted, cwd=ROOT, env=launcher.environment, check=False).returncode == 0
-    overlay = tmp_path / "two_hosts.yaml"
-    overlay.write_text(OVERLAY.format(here=HERE, there=THERE, root=ROOT, python=sys.executable))
-    options = ("rule_learning", "--robot", "koch_v1_1", "--seed", "1", "--headless", "--with", "sim")
+@pytest.mark.parametrize("seed", range(5))
+def test_a_seed_is_the_same_run_on_one_host_and_on_two(launcher, hosts, tmp_path, seed):
+    options = ("rule_learning", "--robot", "koch_v1_1", "--seed", str(seed), "--headless", "--with", "sim")
     recordings = []
-    for words in (("--with", str(overlay)), ()):
-        launcher.within = ("ip", "netns", "exec", here) if words else ()
+    for words in (("--with", overlay(tmp_path, CAMERA_AWAY)), ()):
         code, shown = launcher.run(*options, *words, timeout_s=1500)
         assert code == 0, shown
         recordings.append(content(launcher.latest / "recording.mcap"))
         if words:
             log = (launcher.latest / "logs" / "relay_robot_pc.log").read_text()
             assert "camera_pc: replies within" in log
-            assert ip("netns", "pids", there).stdout == "", "a process is left"
     two, one = recordings
     assert {topic: len(some) for topic, some in two.items()} == {topic: len(some) for topic, some in one.items()}
     assert two == one
+
+
+class ArmWatch:
+    """What the arm's driver publishes on the other host: states of the gate, and joints, by this host's clock."""
+
+    def __init__(self, hosts, launcher):
+        folder = Path(launcher.environment["XDG_RUNTIME_DIR"], "there", "paramove", "test")
+        program = [*hosts.within_there, sys.executable, str(Path(__file__).parent / "arm_watch.py"), str(folder)]
+        self._process = subprocess.Popen(program, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+        self.gate, self.joints = [], []
+        self._thread = threading.Thread(target=self._read)
+        self._thread.start()
+
+    def _read(self):
+        for line in self._process.stdout:
+            time_s, *rest = json.loads(line)
+            (self.gate if len(rest) == 2 else self.joints).append((time_s - CLOCK_AHEAD_S, *rest))
+
+    def until(self, condition, seconds=60.0):
+        end_s = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < end_s, "not in time"
+            threading.Event().wait(0.01)
+
+    def close(self):
+        self._process.kill()
+        self._process.wait()
+        self._thread.join()
+        self._process.stdout.close()
+
+
+@pytest.fixture
+def arm_watch(hosts, launcher):
+    watch = ArmWatch(hosts, launcher)
+    yield watch
+    watch.close()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_cut_link_stops_the_arm_and_nothing_moves_when_it_is_back(launcher, hosts, arm_watch, tmp_path, seed):
+    draw = random.Random(seed)
+    started = launcher.start("dynamixel_arm", "--headless", "--with", "emulated", "--with", overlay(tmp_path, ARM_AWAY))
+    arm_watch.until(lambda: arm_watch.gate and arm_watch.gate[-1][1] == "STATE_ARMED")
+    armed_s = time.monotonic()
+    wait_s = draw.uniform(0.5, LAST_MOTION_S - FIRST_MOTION_S)
+    arm_watch.until(lambda: time.monotonic() > armed_s + wait_s and arm_watch.gate[-1][1] == "STATE_ARMED")
+    cut_s = time.monotonic()
+    hosts.link(loss=1.0)
+    arm_watch.until(lambda: arm_watch.gate[-1][1] == "STATE_HOLD")
+    stop = next(one for one in arm_watch.gate if one[0] > cut_s and one[1] != "STATE_ARMED")
+    _log.info("cut %.1f s after arming: stop begun %.0f ms later", wait_s, 1e3 * (stop[0] - cut_s))
+    assert stop[0] - cut_s <= STOP_LIMIT_S
+    assert any("no reply from desk_pc" in fault for fault in stop[2])
+    listed = subprocess.run(
+        [*hosts.within_there, *PARAMOVE.split(), "node", "list"],
+        env=launcher.environment | {"XDG_RUNTIME_DIR": launcher.environment["XDG_RUNTIME_DIR"] + "/there"},
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout
+    assert "hold" in listed
+    hosts.link()
+    restored_s = time.monotonic()
+    arm_watch.until(lambda: time.monotonic() > restored_s + 2.0)
+    moved = np.array([positions for time_s, positions in arm_watch.joints if time_s > stop[0] + 0.5])
+    assert len(moved) > 50
+    assert np.ptp(moved, axis=0).max() < STILL
+    armed = at_terminal(f"{' '.join(hosts.within)} {PARAMOVE} arm enable --yes", "", launcher.environment)
+    assert armed[0] == 0, armed
+    arm_watch.until(lambda: arm_watch.gate[-1][1] == "STATE_ARMED")
+    started.send_signal(signal.SIGINT)
+    shown = started.communicate(timeout=60)[0]
+    assert started.returncode == 130, shown
+    assert "no longer armed" in shown
+    assert "no reply from desk_pc" in shown

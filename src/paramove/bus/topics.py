@@ -150,7 +150,7 @@ OPERATOR_ESTOP = replace(OPERATOR_STOP, name="operator/estop")
 OPERATOR_ARM_AWAY = replace(OPERATOR_ARM, name="operator/arm_away", recorded=False)
 OPERATOR_STOP_AWAY = replace(OPERATOR_STOP, name="operator/stop_away", recorded=False)
 """From persons at other hosts, by this host's relay; recorded under the names that they have there."""
-HOSTS_LINK = Topic("hosts/link", LinkState, 100, _LATEST)
+HOSTS_LINK = Topic("hosts/link", LinkState, 100, _QUEUE)
 WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES)
 WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=True)
 TRUTH_LAYOUT = Topic("truth/layout", TruthLayout, None, _LATCHED, "world")
@@ -169,6 +169,8 @@ TOPICS: tuple[Topic, ...] = tuple(
 RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
 STEREO_IMAGES_RAW = CAMERA_IMAGES_RAW[:2]
 """Images of two cameras, for tracking an arm."""
+BY_RELAYS = (OPERATOR_ARM_AWAY, OPERATOR_STOP_AWAY, HOSTS_LINK)
+"""Published in runs on several hosts only."""
 PERSONS_STOPS = (OPERATOR_STOP, OPERATOR_ESTOP)
 """A person's stops."""
 AWAY = {OPERATOR_ARM.name: OPERATOR_ARM_AWAY, **{topic.name: OPERATOR_STOP_AWAY for topic in PERSONS_STOPS}}

@@ -28,7 +28,8 @@ class ClockOffset:
 
     def add(self, sent_ns: int, there_ns: int, received_ns: int) -> None:
         """Take one reply: when it was requested and received here, and when it was made there."""
-        low, high = there_ns - received_ns, there_ns - sent_ns
+        drifted = MOST_DRIFT * (received_ns - sent_ns)
+        low, high = there_ns - received_ns - drifted, there_ns - sent_ns + drifted
         before_low, before_high = self._interval(received_ns)
         if self._first_ns is not None and max(low, before_low) > min(high, before_high):
             self.jumps += 1

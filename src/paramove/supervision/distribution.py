@@ -66,7 +66,7 @@ def crossing(launch: Launch, interfaces: Mapping[str, Interface]) -> Crossing:
         for topic in interface.subscribes:
             subscribed = on_bus(launch, name, topic)
             sources = {publisher.get(subscribed, own)}
-            if topic in _BY_RELAYS:
+            if topic in topics.BY_RELAYS:
                 sources = set()
             elif topic.name in topics.AWAY and subscribed not in publisher and topics.ARM_SAFETY in interface.publishes:
                 sources = arming if topic == topics.OPERATOR_ARM else {*launch.file.hosts}
@@ -172,7 +172,6 @@ def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostK
 
 
 _COMMANDS = frozenset(topic.name for topic in (topics.ARM_TRAJECTORY, *topics.ARMINGS))
-_BY_RELAYS = (*topics.AWAY.values(), topics.HOSTS_LINK)
 
 
 def _relay(host: str) -> str:

@@ -72,13 +72,13 @@ class Graph:
 
 
 def graph_of(launch: Launch, interfaces: Mapping[str, Interface]) -> Graph:
-    """Graph of a checked launch file; remaps are followed."""
+    """Graph of a checked launch file; remaps are followed, relays are no nodes of it."""
     publishers: dict[str, list[str]] = {}
     subscribers: dict[str, list[str]] = {}
     table: dict[str, Topic] = {}
     for name, interface in interfaces.items():
         for by_topic, side in ((publishers, interface.publishes), (subscribers, interface.subscribes)):
-            for topic in side:
+            for topic in (topic for topic in side if topic not in topics.BY_RELAYS):
                 by_topic.setdefault(on_bus(launch, name, topic), []).append(name)
                 table[on_bus(launch, name, topic)] = topic
     rates = {name: topic.rate_hz for name, topic in table.items()}

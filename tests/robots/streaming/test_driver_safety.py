@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
-from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
+from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, SafetyState
 from paramove.robots.streaming.driver import SAFETY_STATES, ArmDriver
 from paramove.robots.streaming.stream import StreamReader
 from paramove.safety.gate_io import Fault, SafetySettings, State
@@ -151,3 +151,51 @@ def test_a_robot_that_falls_silent_after_a_fault_is_told_by_that_fault_first() -
     rig.arm()
     assert (rig.driver.state, codes(rig)) == (State.ARMED, [])
     assert silent(rig) == ["robot_silent"]
+
+
+LINK_S = 0.08
+
+
+def linked(rig: Rig) -> None:
+    rig.driver.on_link(LinkState(hosts=["desk_pc"]), rig.now_ns + TICK_NS - 10_000_000)
+
+
+def test_a_lost_link_stops_the_robot_and_its_return_moves_nothing() -> None:
+    rig = Rig()
+    rig.driver = ArmDriver(HOAP3, link_timeout_s=LINK_S)
+    rig.tick()
+    rig.arm()
+    assert (rig.driver.state, codes(rig)) == (State.DISARMED, ["link_lost"])  # no other host has replied yet
+    linked(rig)
+    rig.arm()
+    rig.send("one", GOAL, duration_s=2.0)
+    for _ in range(8):
+        linked(rig)
+        rig.tick()
+        assert rig.driver.state is State.ARMED
+        assert not rig.driver.is_cut_off(rig.now_ns)
+    rig.tick()
+    rig.tick()
+    assert (rig.driver.state, codes(rig)) == (State.STOPPING, ["link_lost"])
+    for _ in range(20):
+        linked(rig)
+        rig.tick()
+    assert (rig.driver.state, codes(rig)) == (State.HOLD, ["link_lost"])
+    assert rig.statuses[-1].state == TrajectoryStatus.STATE_STOPPED
+    assert "desk_pc" in rig.statuses[-1].reason
+    linked(rig)
+    rig.arm()
+    assert rig.driver.state is State.ARMED
+    assert rig.robot.reader.at_rest
+    expect_within_limits(rig)
+
+
+def test_a_lost_link_while_nothing_moves_only_keeps_it_disarmed() -> None:
+    rig = Rig()
+    rig.driver = ArmDriver(HOAP3, link_timeout_s=LINK_S)
+    for _ in range(10):
+        rig.tick()
+    assert (rig.driver.state, codes(rig)) == (State.DISARMED, [])
+    linked(rig)
+    rig.arm()
+    assert rig.driver.state is State.ARMED

@@ -318,7 +318,7 @@ class ArmDriver:
             return None
         age_ms, allowed_ms = float("inf"), 1e3 * self._link_timeout_s
         if confirmed_ns is not None:
-            age_ms = 1e-6 * (now_ns - confirmed_ns)
+            age_ms = 1e-6 * abs(now_ns - confirmed_ns)  # one from the future has a clock of its own
         if age_ms <= allowed_ms:
             return None
         since = "" if confirmed_ns is None else f" for {age_ms:.0f} ms"

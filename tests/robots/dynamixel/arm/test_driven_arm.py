@@ -17,7 +17,7 @@ from dynamixel_emulator.servo import EmulatedServo
 from dynamixel_emulator.wire_faults import WireFaults
 from paramove.bus import topics
 from paramove.documents.input_error import InputError
-from paramove.msgs.safety_state_pb2 import StopRequest
+from paramove.msgs.safety_state_pb2 import LinkState, StopRequest
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.driven_arm import SLOW_NS, DrivenArm
 from paramove.robots.dynamixel.arm.servo_arm import ServoArm, Timeouts
@@ -221,6 +221,37 @@ def test_an_emergency_stop_by_a_file_stays_and_its_release_moves_nothing(emulato
         assert arm.trouble == ""
         person.arms()
         person.waits_for("ARMED")
+
+
+def test_a_lost_link_to_the_host_that_commands_stops_it_and_its_return_moves_nothing(emulator):
+    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), replace(SETTINGS, link_timeout_s=0.5)) as arm:
+        person = PersonAtEmulator(arm, emulator)
+        replies, ended = threading.Event(), threading.Event()
+        replies.set()
+
+        def link():
+            while not ended.wait(0.01):
+                if replies.is_set():
+                    arm.on_link(LinkState(hosts=["desk_pc"]), time.monotonic_ns())
+
+        linked = threading.Thread(target=link)
+        linked.start()
+        try:
+            person.arms_and_waits()
+            person.moves()
+            replies.clear()
+            person.waits_for("HOLD")
+            assert [fault.code for fault in person.safety.faults] == ["link_lost"]
+            assert "desk_pc" in person.is_told("STOPPED").reason
+            rested = person.goals()
+            assert rested != list(ROBOT.units.to_counts(person.away()))
+            replies.set()
+            person.arms()
+            person.waits_for("ARMED")
+            assert person.goals() == rested
+        finally:
+            ended.set()
+            linked.join()
 
 
 @pytest.mark.parametrize(

@@ -127,7 +127,7 @@ class ServoLoop:
         self._on_output = on_output
         self._arm = ServoArm(servos, ServoChain(port), self._period_s, settings.timeouts)
         self._reader: StreamReader | None = None
-        self._output: list[DriverOutput] = []
+        self._output: deque[DriverOutput] = deque()  # needs no lock: a check of a trajectory would hold it for long
         self._step = 0
         self._begun_s, self._pause_s = self._now_s, 0.0
         self._urgent = self._ended = self._normal_end = False
@@ -167,9 +167,7 @@ class ServoLoop:
 
     def take(self) -> list[DriverOutput]:
         """The driver's output since the last call."""
-        with self.lock:
-            output, self._output = self._output, []
-        return output
+        return [self._output.popleft() for _ in range(len(self._output))]
 
     def run_to(self, time_ns: int) -> None:
         """All periods up to a time, in the thread of the caller, if the clock is that of an emulator.
