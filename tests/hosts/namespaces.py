@@ -77,6 +77,11 @@ class Namespaces:
         """Of the other host."""
         return [int(pid) for pid in ip("netns", "pids", self._names[1]).stdout.split()]
 
+    def agent(self) -> int:
+        """Process of the agent on the other host."""
+        commands = {pid: Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0") for pid in self.processes()}
+        return next(pid for pid, words in commands.items() if words[-3:-1] == [b"host", b"agent"] and b"-m" in words)
+
     def ssh(self, folder: Path, runtime: Path, config: Path) -> dict[str, str]:
         """Environment of a launcher here that reaches the other host by the stand-in for ssh."""
         file = folder / "environment_there.json"

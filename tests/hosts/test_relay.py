@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import selectors
 import socket
 import struct
 import time
@@ -16,6 +17,7 @@ from paramove.hosts import HostKeyError, link
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.rule_pb2 import Rule, Rules, Speech
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
+from tests.hosts.conftest import free_ports
 
 
 def test_messages_arrive_as_they_were_published_each_once(two_hosts):
@@ -259,3 +261,94 @@ def test_what_persons_request_elsewhere_leaves_the_topic_to_those_here(two_hosts
     hosts.until(lambda: time.monotonic() > begun_s + 0.5, arms.serve, stops.serve)
     assert armed.receive() is None
     assert stopped.receive() is None
+
+
+class Proxy:
+    """Between two relays: forwards and keeps what goes each way; once `replays`, sends what was kept instead."""
+
+    def __init__(self, port, to):
+        self.kept = {"asked": b"", "given": b""}
+        self.replays = False
+        self.replayed = 0
+        self._to = to
+        self._ways, self._sockets = selectors.DefaultSelector(), []
+        self._listens = self._of(socket.create_server(("127.0.0.1", port)))
+        self._ways.register(self._listens, selectors.EVENT_READ, None)
+
+    def _of(self, one):
+        self._sockets.append(one)
+        return one
+
+    def step(self):
+        for key, _ in self._ways.select(0):
+            if key.data is None:
+                self._accept()
+            else:
+                self._copy(key.fileobj, *key.data)
+
+    def _accept(self):
+        asker = self._of(self._listens.accept()[0])
+        if self.replays:
+            self.replayed += 1
+            asker.sendall(self.kept["given"])
+            again = self._of(socket.create_connection(("127.0.0.1", self._to)))
+            again.sendall(self.kept["asked"])
+            return
+        giver = self._of(socket.create_connection(("127.0.0.1", self._to)))
+        self._ways.register(asker, selectors.EVENT_READ, (giver, "asked"))
+        self._ways.register(giver, selectors.EVENT_READ, (asker, "given"))
+
+    def _copy(self, one, other, way):
+        with contextlib.suppress(OSError):
+            if part := one.recv(65536):
+                self.kept[way] += part
+                other.sendall(part)
+                return
+        self._ways.unregister(one)
+
+    def cut(self):
+        for key in list(self._ways.get_map().values()):
+            if key.data is not None:
+                self._ways.unregister(key.fileobj)
+                key.fileobj.close()
+
+    def close(self):
+        for one in self._sockets:
+            one.close()
+        self._ways.close()
+
+
+def test_packets_that_are_sent_again_are_worth_nothing(two_hosts):
+    hosts = two_hosts((topics.SPEECH,))
+    port = free_ports()
+    proxy = Proxy(port, hosts.ports["here"])
+    images = Proxy(port + 1, hosts.ports["here"] + 1)
+    honest = hosts.settings["there"].peers["here"].model_copy(update={"port": port})
+    hosts.settings["there"] = hosts.settings["there"].model_copy(update={"peers": {"here": honest}})
+    published, subscriber = (
+        hosts.visitor("here").publisher(topics.SPEECH),
+        hosts.visitor("there").subscriber(topics.SPEECH),
+    )
+    hosts.start()
+    received = []
+
+    def serve():
+        proxy.step()
+        images.step()
+        published.serve()
+        if (one := subscriber.receive()) is not None:
+            received.append(one.message.text)
+
+    hosts.until(lambda: subscriber.welcomed, serve)
+    published.publish(Speech(text="move"), 1, 1)
+    hosts.until(lambda: received == ["move"], serve)
+    proxy.replays = True
+    proxy.cut()
+    hosts.until(lambda: proxy.replayed > 1 and hosts.relays["there"].trouble == "no link to here", serve)
+    assert received == ["move"]
+    proxy.replays = False
+    hosts.until(lambda: not hosts.relays["there"].trouble, serve)
+    published.publish(Speech(text="again"), 1, 1)
+    hosts.until(lambda: received == ["move", "again"], serve)
+    proxy.close()
+    images.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import random
 import signal
 import subprocess
@@ -16,7 +17,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from paramove.documents import exit_codes
 from paramove.recording.reader import read
+from paramove.supervision import load
+from paramove.workspace import Workspace
+from studies.faults.kill_cases import SIGNALS, Expected, expected_of
+from studies.faults.leftovers import left_over
 from tests.docs.terminal import at_terminal
 from tests.hosts.namespaces import CLOCK_AHEAD_S, HERE, THERE, Namespaces
 
@@ -60,7 +66,8 @@ def hosts(launcher, tmp_path):
         assert subprocess.run(trust, cwd=ROOT, env=launcher.environment, check=False).returncode == 0
         launcher.within = hosts.within
         yield hosts
-        assert hosts.processes() == [], "a process is left"
+        runtimes = (Path(launcher.environment["XDG_RUNTIME_DIR"], *there, "paramove") for there in ((), ("there",)))
+        assert [what for folder in runtimes for what in left_over("test", folder)] == []
 
 
 def overlay(folder, text):
@@ -117,7 +124,7 @@ class ArmWatch:
     def until(self, condition, seconds=60.0):
         end_s = time.monotonic() + seconds
         while not condition():
-            assert time.monotonic() < end_s, "not in time"
+            assert time.monotonic() < end_s, f"not in time; the gate: {self.gate[-1:]}"
             threading.Event().wait(0.01)
 
     def close(self):
@@ -172,3 +179,66 @@ def test_a_cut_link_stops_the_arm_and_nothing_moves_when_it_is_back(launcher, ho
     assert started.returncode == 130, shown
     assert "no longer armed" in shown
     assert "no reply from desk_pc" in shown
+
+
+NODES = load(Workspace.at(ROOT), "dynamixel_arm", ["emulated"]).file
+VICTIMS = (*(name for name in NODES.nodes if name != "judge"), "relay_desk_pc", "relay_robot_pc", "agent", "launcher")
+MOMENTS = {"starts": None, "moves": 1.5, "carries": 14.0}
+"""Seconds since the arm was armed; at the start the victim has just been started."""
+
+
+def must_follow(victim, number):
+    """As on one host; a relay is restarted, and an agent's end is that of the run."""
+    if victim.startswith("relay"):
+        return Expected.GOES_ON
+    return Expected.ENDS if victim == "agent" else expected_of(victim, number, NODES)
+
+
+class Happened:
+    """Events of a launcher."""
+
+    def __init__(self, launcher):
+        self._launcher = launcher
+
+    def of(self, node, *kinds):
+        file = self._launcher.latest / "events.jsonl"
+        events = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+        return [event for event in events if event.get("node") == node and event["event"] in kinds]
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("victim", VICTIMS)
+def test_a_killed_or_stopped_process_on_either_host(launcher, hosts, arm_watch, tmp_path, victim, number, moment):
+    started = launcher.start("dynamixel_arm", "--headless", "--with", "emulated", "--with", overlay(tmp_path, ARM_AWAY))
+    happened = Happened(launcher)
+    seen = victim if victim in NODES.nodes or victim.startswith("relay") else "recorder"
+    arm_watch.until(lambda: happened.of(seen, "started"))
+    if MOMENTS[moment] is not None:
+        arm_watch.until(lambda: arm_watch.gate and arm_watch.gate[-1][1] == "STATE_ARMED")
+        due_s = time.monotonic() + MOMENTS[moment]
+        arm_watch.until(lambda: time.monotonic() > due_s)
+    pids = {"launcher": lambda: started.pid, "agent": hosts.agent}
+    pid = pids.get(victim, lambda: happened.of(victim, "started")[-1]["pid"])()
+    begun_s = time.monotonic()
+    os.kill(pid, SIGNALS[number])
+    expected = must_follow(victim, number)
+    if expected is Expected.UNHARMED:
+        arm_watch.until(lambda: time.monotonic() > begun_s + 1.5)
+        os.kill(pid, signal.SIGCONT)
+    elif expected is Expected.GOES_ON:
+        arm_watch.until(lambda: len(happened.of(victim, "started")) > 1)
+        again_s = 1e-9 * happened.of(victim, "started")[-1]["monotonic_ns"]
+        arm_watch.until(lambda: any(1e-9 * event["monotonic_ns"] > again_s for event in happened.of(victim, "ready")))
+    if expected in (Expected.UNHARMED, Expected.GOES_ON):
+        arm_watch.until(lambda: time.monotonic() > begun_s + 4.0)
+        assert started.poll() is None, started.stdout.read()
+        started.send_signal(signal.SIGINT)
+    shown = started.communicate(timeout=40)[0]
+    if expected in (Expected.ENDS, Expected.ENDS_BACK):
+        assert started.returncode == exit_codes.FAILURE, shown
+        assert ("robot_pc" if victim == "agent" else victim) in shown.splitlines()[-1]
+    if victim.startswith("relay") and moment != "starts":
+        stop = next(one for one in arm_watch.gate if one[0] > begun_s and one[1] != "STATE_ARMED")
+        assert stop[0] - begun_s <= STOP_LIMIT_S
+    arm_watch.until(lambda: not hosts.processes())

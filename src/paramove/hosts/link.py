@@ -34,7 +34,8 @@ from paramove.hosts.settings import Peer
 WANT, BEAT, MESSAGE, TAKEN, DONE = b"W", b"B", b"M", b"C", b"D"
 WANT_S, BEAT_S, IMAGES_BEAT_S = 0.2, 0.01, 0.1
 LOST_S = 2.0
-"""Without a reply for so long, a link counts as lost."""
+"""Without a reply for so long, a connection counts as lost."""
+REOPEN_S = 4.0
 MAX_ASKED_BYTES = 65_536
 _TIME = struct.Struct("<q")
 _log = logging.getLogger(__name__)
@@ -208,16 +209,8 @@ class Request:
         self._latest_s = 0.0
         self._best_s = float("-inf")
         self._beat_s, self._beat_due_s, self._want_due_s = beat_s, 0.0, 0.0
-        self.socket: zmq.Socket[Any] = context.socket(zmq.DEALER)
-        self.socket.setsockopt_string(zmq.CURVE_SERVERKEY, peer.key)
-        self.socket.setsockopt_string(zmq.CURVE_PUBLICKEY, own.public)
-        self.socket.setsockopt_string(zmq.CURVE_SECRETKEY, own.secret)
-        self.socket.setsockopt(zmq.RCVHWM, 1000)
-        self.socket.setsockopt(zmq.IMMEDIATE, 1)  # what cannot be sent now would be of no use later
-        self.socket.setsockopt(zmq.RECONNECT_IVL, 50)
-        self.socket.setsockopt(zmq.RECONNECT_IVL_MAX, 500)
-        _keep_alive(self.socket)
-        self.socket.connect(f"tcp://{peer.address}:{port}")
+        self._context, self._own, self._peer, self._port = context, own, peer, port
+        self._open()
 
     @property
     def is_up(self) -> bool:
@@ -255,9 +248,33 @@ class Request:
                 continue
             yield name.decode(), header, frames[2]
 
+    def revive(self) -> bool:
+        """Reopens the socket after a while without a reply; returns whether it did.
+
+        libzmq gives up for good once somebody else has answered at that port, who lacks the other host's key.
+        """
+        if time.monotonic() - max(self._latest_s, self._opened_s) < REOPEN_S:
+            return False
+        self.socket.close(linger=0)
+        self._open()
+        return True
+
     def close(self) -> None:
         """Closes the socket."""
         self.socket.close(linger=200)
+
+    def _open(self) -> None:
+        self._opened_s = time.monotonic()
+        self.socket: zmq.Socket[Any] = self._context.socket(zmq.DEALER)
+        self.socket.setsockopt_string(zmq.CURVE_SERVERKEY, self._peer.key)
+        self.socket.setsockopt_string(zmq.CURVE_PUBLICKEY, self._own.public)
+        self.socket.setsockopt_string(zmq.CURVE_SECRETKEY, self._own.secret)
+        self.socket.setsockopt(zmq.RCVHWM, 1000)
+        self.socket.setsockopt(zmq.IMMEDIATE, 1)  # what cannot be sent now would be of no use later
+        self.socket.setsockopt(zmq.RECONNECT_IVL, 50)
+        self.socket.setsockopt(zmq.RECONNECT_IVL_MAX, 500)
+        _keep_alive(self.socket)
+        self.socket.connect(f"tcp://{self._peer.address}:{self._port}")
 
     def _measure(self, sent_ns: int, there_ns: int) -> None:
         now_ns = time.monotonic_ns()
@@ -273,6 +290,7 @@ class Request:
 
 def _keep_alive(socket: zmq.Socket[Any]) -> None:
     """A cut that TCP would notice after minutes ends the connection, and it is made anew."""
+    socket.setsockopt(zmq.HANDSHAKE_IVL, round(1000 * LOST_S))
     socket.setsockopt(zmq.HEARTBEAT_IVL, 500)
     socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, round(1000 * LOST_S))
     socket.setsockopt(zmq.HEARTBEAT_TTL, round(1000 * LOST_S))

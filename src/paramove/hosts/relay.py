@@ -194,11 +194,12 @@ class Relay:
     def _look_after(self) -> None:
         if time.monotonic() >= self._detail_due_s:
             self._detail_due_s, self.detail = time.monotonic() + 1.0, self._links()
-        for source in self._sources.values():
-            before = source.socket
-            if source.subscriber.revive():
+        ends: list[_Source | Request] = [*self._sources.values(), *self._each_request()]
+        for end in ends:
+            before = end.socket
+            if end.revive():
                 self._poller.unregister(before)
-                self._poller.register(source.socket, zmq.POLLIN)
+                self._poller.register(end.socket, zmq.POLLIN)
         for publisher in self._publishers.values():
             publisher.foreign.look()
         if self._answers is not None:
@@ -326,6 +327,10 @@ class _Source:
     def socket(self) -> zmq.Socket[Any]:
         """Of the subscriber; another one after it was revived."""
         return self.subscriber.socket
+
+    def revive(self) -> bool:
+        """See `Subscriber.revive`."""
+        return self.subscriber.revive()
 
     def frames(self, envelope: Envelope, payload: bytes) -> list[bytes]:
         """A message of the topic as it crosses."""
