@@ -185,8 +185,9 @@ class Relay:
                     self._publish(request, host, name, header, payload)
         self._report_link()
         if self._answers is not None and self._settings.clock_from is not None:
-            for header, payload in self._answers.collect():
-                self._requests[self._settings.clock_from][0].send(DONE, header, payload)
+            request = self._requests[self._settings.clock_from][0]
+            for header, payload in self._answers.collect() if request.is_up else ():
+                request.send(DONE, header, payload)
 
     def _each_request(self) -> list[Request]:
         return [request for pair in self._requests.values() for request in pair]
