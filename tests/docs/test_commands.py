@@ -189,10 +189,10 @@ def check_git(words):
 
 
 def check_docker(words):
-    """The service of a `docker compose -f FILE run [OPTION...] SERVICE` exists; Docker itself is not needed."""
+    """The service of a `docker compose -f FILE run|up [OPTION...] SERVICE` exists; Docker itself is not needed."""
     assert words[1:3] == ["compose", "-f"]
     services = YAML(typ="safe", pure=True).load((ROOT / words[3]).read_text())["services"]
-    assert words[4] == "run"
+    assert words[4] in ("run", "up")
     assert set(services).intersection(words[5:])
     for service in services.values():
         folder = ROOT / Path(words[3]).parent / service["build"]["context"]
