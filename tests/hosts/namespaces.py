@@ -10,6 +10,7 @@ import json
 import os
 import random
 import select
+import shutil
 import struct
 import subprocess
 import sys
@@ -20,9 +21,12 @@ from pathlib import Path
 import pytest
 
 HERE, THERE = "10.99.0.1", "10.99.0.2"
+NAMES = ("camera-pc", "robot-pc")
+"""Of the second host, on the first one."""
 CLOCK_AHEAD_S = 5000
 """The monotonic clock of `there`, which has a time namespace of its own."""
-STAND_IN = Path(__file__).parents[1] / "supervision" / "ssh_stand_in.py"
+ROOT = Path(__file__).parents[2]
+STAND_IN = ROOT / "tests" / "supervision" / "ssh_stand_in.py"
 _TUNSETIFF, _TUN_WITHOUT_HEAD = 0x400454CA, 0x1001
 _MTU = 9000
 
@@ -47,6 +51,10 @@ class Namespaces:
             if ip("netns", "add", name).returncode:
                 pytest.skip("network namespaces need root")
             self._opened.callback(ip, "netns", "del", name)
+        names = Path("/etc/netns", self._names[0])  # `ip netns exec` lays what is in it over /etc
+        names.mkdir(parents=True)
+        self._opened.callback(shutil.rmtree, names)
+        (names / "hosts").write_text(f"127.0.0.1 localhost\n{THERE} {' '.join(NAMES)}\n")
         self._link = subprocess.Popen(
             ["nice", "-n", "-15", sys.executable, __file__, str(self._seed), *self._devices],
             stdin=subprocess.PIPE,
@@ -85,7 +93,12 @@ class Namespaces:
     def ssh(self, folder: Path, runtime: Path, config: Path) -> dict[str, str]:
         """Environment of a launcher here that reaches the other host by the stand-in for ssh."""
         file = folder / "environment_there.json"
-        file.write_text(json.dumps({"XDG_RUNTIME_DIR": str(runtime), "XDG_CONFIG_HOME": str(config)}))
+        home = folder / "home_there"
+        home.mkdir()
+        (home / "paramove").symlink_to(ROOT)
+        path = f"{ROOT / '.venv' / 'bin'}{os.pathsep}{os.environ['PATH']}"
+        there = {"XDG_RUNTIME_DIR": str(runtime), "XDG_CONFIG_HOME": str(config), "HOME": str(home), "PATH": path}
+        file.write_text(json.dumps(there))
         runtime.mkdir(mode=0o700, exist_ok=True)
         return {"PARAMOVE_SSH": " ".join([*self.within_there, sys.executable, str(STAND_IN), str(file)])}
 

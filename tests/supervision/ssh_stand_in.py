@@ -1,4 +1,4 @@
-"""Stands in for ssh: runs the command on "another host", which is another folder, and copies its input and output.
+"""Stands in for ssh: runs the command on "another host", another home folder, and copies its input and output.
 
 Usage: python ssh_stand_in.py ENVIRONMENT_FILE HOST COMMAND. Killed, it is a cut connection; stopped, one that is
 silent.
@@ -12,10 +12,11 @@ import sys
 from pathlib import Path
 
 
-def main(environment, command):
-    added = json.loads(Path(environment).read_text())
+def main(file, command):
+    added = json.loads(Path(file).read_text())
+    environment = {**os.environ, **added}
     there = subprocess.Popen(
-        ["sh", "-c", command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, **added}
+        ["sh", "-c", command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, cwd=added.get("HOME")
     )
     into = there.stdin.fileno()
     ways = selectors.SelectSelector()

@@ -60,14 +60,15 @@ def hosts(launcher, tmp_path):
     """Two hosts; `launcher` starts on the first one, which the second trusts."""
     with Namespaces() as hosts:
         runtime = Path(launcher.environment["XDG_RUNTIME_DIR"], "there")
-        launcher.environment |= {"XDG_CONFIG_HOME": str(tmp_path / "config_here")}
+        domain = f"two-{os.getpid()}"
+        launcher.environment |= {"XDG_CONFIG_HOME": str(tmp_path / "config_here"), "PARAMOVE_DOMAIN": domain}
         launcher.environment |= hosts.ssh(tmp_path, runtime, tmp_path / "config_there")
         trust = [*PARAMOVE.split(), "host", "trust", "other", "--folder", str(ROOT), "--command", PARAMOVE]
         assert subprocess.run(trust, cwd=ROOT, env=launcher.environment, check=False).returncode == 0
         launcher.within = hosts.within
         yield hosts
         runtimes = (Path(launcher.environment["XDG_RUNTIME_DIR"], *there, "paramove") for there in ((), ("there",)))
-        assert [what for folder in runtimes for what in left_over("test", folder)] == []
+        assert [what for folder in runtimes for what in left_over(domain, folder)] == []
 
 
 def overlay(folder, text):
@@ -105,11 +106,33 @@ def test_a_seed_is_the_same_run_on_one_host_and_on_two(launcher, hosts, tmp_path
     assert two == one
 
 
+TUTORIAL = ROOT / "docs" / "tutorials" / "two_computers.md"
+
+
+def test_the_commands_of_the_tutorial(launcher, hosts):
+    """But those with a real arm; each as it is typed, with the names of the computers that it has."""
+    environment = launcher.environment | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    lines = [line for line in TUTORIAL.read_text().splitlines() if line.startswith("paramove ") and "real" not in line]
+    assert [line.split()[1:3] for line in lines] == [
+        ["host", "trust"],
+        ["host", "check"],
+        ["launch", "rule_learning"],
+        ["launch", "dynamixel_arm"],
+    ]
+    trust = lines[0].replace("camera-pc", "robot-pc")  # the text says so
+    for line in (*lines[:2], trust, *(f"{line} --headless --runs {launcher.folder}" for line in lines[2:])):
+        typed = [*hosts.within, *line.split()]
+        done = subprocess.run(typed, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+
+
 class ArmWatch:
     """What the arm's driver publishes on the other host: states of the gate, and joints, by this host's clock."""
 
     def __init__(self, hosts, launcher):
-        folder = Path(launcher.environment["XDG_RUNTIME_DIR"], "there", "paramove", "test")
+        folder = Path(
+            launcher.environment["XDG_RUNTIME_DIR"], "there", "paramove", launcher.environment["PARAMOVE_DOMAIN"]
+        )
         program = [*hosts.within_there, sys.executable, str(Path(__file__).parent / "arm_watch.py"), str(folder)]
         self._process = subprocess.Popen(program, cwd=ROOT, stdout=subprocess.PIPE, text=True)
         self.gate, self.joints = [], []
@@ -179,6 +202,18 @@ def test_a_cut_link_stops_the_arm_and_nothing_moves_when_it_is_back(launcher, ho
     assert started.returncode == 130, shown
     assert "no longer armed" in shown
     assert "no reply from desk_pc" in shown
+
+
+def test_a_person_stops_the_arm_from_the_other_host(launcher, hosts, arm_watch, tmp_path):
+    started = launcher.start("dynamixel_arm", "--headless", "--with", "emulated", "--with", overlay(tmp_path, ARM_AWAY))
+    arm_watch.until(lambda: arm_watch.gate and arm_watch.gate[-1][1] == "STATE_ARMED")
+    code, shown = at_terminal(f"{' '.join(hosts.within)} {PARAMOVE} arm estop", "", launcher.environment)
+    assert code == 0, shown
+    assert arm_watch.gate[-1][1] in ("STATE_STOPPING", "STATE_HOLD")
+    assert any("by a person" in fault for fault in arm_watch.gate[-1][2])
+    started.send_signal(signal.SIGINT)
+    shown = started.communicate(timeout=60)[0]
+    assert started.returncode == 130, shown
 
 
 NODES = load(Workspace.at(ROOT), "dynamixel_arm", ["emulated"]).file

@@ -5,7 +5,7 @@ alone: it is pinned, so no host can take another one's place, and gets only what
 a host gives is checked against the topics that may come from it. Frames, after the kind of the message:
 
     WANT     names of topics                        asker to offerer, five times a second
-    BEAT     time of sending                        asker to offerer, 100 times a second; images 10 times
+    BEAT     time of sending                        asker to offerer, 10 times a second, 100 for commands
     BEAT     that time, time of the reply           the reply, each by its own host's monotonic clock
     MESSAGE  topic and header, payload              offerer to asker
     TAKEN    name of a topic                        asker to offerer: an image has arrived, send the next
@@ -182,7 +182,7 @@ class Request:
         own: Keys of this host.
         peer: Whom it asks: its pinned key must be the one there.
         names: Of the topics that it wants.
-        beat_s: Time between two beats.
+        beat_s: Time between two beats; default: where no command waits for it.
 
     Attributes:
         clock: That of the other host.

@@ -44,7 +44,18 @@ from paramove.bus import (
 )
 from paramove.hosts.clock_offset import ClockOffset
 from paramove.hosts.keys import HostKeyError, HostKeys
-from paramove.hosts.link import BEAT_S, DONE, MAX_ASKED_BYTES, MESSAGE, TAKEN, Asker, Gatekeeper, Offer, Request
+from paramove.hosts.link import (
+    BEAT_S,
+    DONE,
+    IMAGES_BEAT_S,
+    MAX_ASKED_BYTES,
+    MESSAGE,
+    TAKEN,
+    Asker,
+    Gatekeeper,
+    Offer,
+    Request,
+)
 from paramove.hosts.own_time import LARGEST_BOUND_NS, UnknownTimeError, in_own_time
 from paramove.hosts.settings import RelaySettings
 from paramove.msgs.clock_pb2 import TickDone, TopicMark
@@ -87,6 +98,8 @@ class Relay:
             Offer(away, f"{endpoint}{settings.port + index}", own, settings.peers, f"relay {name}")
             for index, name in enumerate(("topics", "images"))
         )
+        self._real_time = bus.settings.clock == "monotonic"
+        beat_s = BEAT_S if self._real_time else IMAGES_BEAT_S
         self._requests: dict[str, tuple[Request, Request]] = {}
         self._topics: dict[str, Topic] = {}
         self._sources: dict[str, _Source] = {}
@@ -98,12 +111,11 @@ class Relay:
                 self._sources.setdefault(name, _Source(self._here, bus.settings.folder, rows[name], name))
             images = frozenset(name for name in peer.gives if rows[name].is_image)
             self._requests[host] = (
-                Request(away, peer.port, own, peer, frozenset(peer.gives) - images, BEAT_S),
+                Request(away, peer.port, own, peer, frozenset(peer.gives) - images, beat_s),
                 Request(away, peer.port + 1, own, peer, images),
             )
         self._answers = _Answers(self._here, bus) if settings.clock_from else None
         self._members: dict[str, zmq.Socket[Any]] = {}
-        self._real_time = bus.settings.clock == "monotonic"
         self._latest: dict[tuple[str, str], tuple[int, int]] = {}
         self._link = LinkState(hosts=sorted(host for host, peer in settings.peers.items() if peer.commands))
         self._confirmed_ns = 0
