@@ -13,6 +13,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+import zmq
 
 from paramove.hosts import HostKeys
 from tests.hosts.conftest import free_ports
@@ -174,3 +175,13 @@ def test_a_host_is_trusted_once_and_a_changed_key_is_rejected(two_hosts):
         assert rejected.returncode == 78
         assert pinned in rejected.stderr
         assert "0" * 40 in rejected.stderr
+
+
+def test_a_key_that_begins_like_an_option_is_a_key(two_hosts):
+    public = ""
+    while not public.startswith("-"):
+        public, secret = (key.decode() for key in zmq.curve_keypair())
+    two_hosts.keys.own()
+    (two_hosts.keys.folder / "own.key").write_text(f"{public}\n{secret}\n")
+    trusted = two_hosts.host("trust")
+    assert trusted.returncode == 0, trusted.stderr

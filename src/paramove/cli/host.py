@@ -34,7 +34,7 @@ def trust(host: HostArgument, folder: FolderOption = None, command: CommandOptio
     """
     keys, there = HostKeys(), HostSettings(ssh=host, folder=folder, command=command)
     new = keys.trust(host, _asked(there, "key").strip())
-    _asked(there, "accept", socket.gethostname(), keys.own().public)
+    _asked(there, "accept", "--", socket.gethostname(), keys.own().public)  # a key may begin with a hyphen
     typer.echo(f"{host} is {'now' if new else 'still'} trusted, and trusts this computer")
 
 

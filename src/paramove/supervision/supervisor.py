@@ -207,6 +207,9 @@ class Supervisor:
         number = self._interrupts.first or self._view.closed_by
         if number is not None:
             return Outcome(exit_codes.by_signal(number), exit_codes.interrupted(number))
+        for name, host in self._hosts.items():
+            if host.lost:
+                return Outcome(exit_codes.FAILURE, f"the connection to {name} is lost: {host.lost}")
         for node in self.nodes.values():
             if node.state is State.FINISHED and node.settings.ends_run:
                 return Outcome(exit_codes.OK, f"{node.name} has finished")
