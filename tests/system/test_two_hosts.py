@@ -46,8 +46,9 @@ nodes:
   arm_driver: {{host: robot_pc}}
   dynamixel_emulator: {{host: robot_pc}}
   judge: null
-  reacher: {{required: false}}
 """
+GOES_ON = "  reacher: {required: false}\n"
+"""The run goes on when the arm has stopped, and with it the task."""
 _log = logging.getLogger(__name__)
 STOP_LIMIT_S = 0.1
 STILL = np.deg2rad(0.2)
@@ -184,7 +185,9 @@ def arm_watch(hosts, launcher):
 @pytest.mark.parametrize("seed", range(20))
 def test_a_cut_link_stops_the_arm_and_nothing_moves_when_it_is_back(launcher, hosts, arm_watch, tmp_path, seed):
     draw = random.Random(seed)
-    started = launcher.start("dynamixel_arm", "--headless", "--with", "emulated", "--with", overlay(tmp_path, ARM_AWAY))
+    started = launcher.start(
+        "dynamixel_arm", "--headless", "--with", "emulated", "--with", overlay(tmp_path, ARM_AWAY + GOES_ON)
+    )
     arm_watch.until(lambda: arm_watch.gate and arm_watch.gate[-1][1] == "STATE_ARMED")
     armed_s = time.monotonic()
     wait_s = draw.uniform(0.5, LONGEST_WAIT_S)
@@ -222,7 +225,9 @@ def test_a_cut_link_stops_the_arm_and_nothing_moves_when_it_is_back(launcher, ho
 
 
 def test_a_person_stops_the_arm_from_the_other_host(launcher, hosts, arm_watch, tmp_path):
-    started = launcher.start("dynamixel_arm", "--headless", "--with", "emulated", "--with", overlay(tmp_path, ARM_AWAY))
+    started = launcher.start(
+        "dynamixel_arm", "--headless", "--with", "emulated", "--with", overlay(tmp_path, ARM_AWAY + GOES_ON)
+    )
     arm_watch.until(lambda: arm_watch.gate and arm_watch.gate[-1][1] == "STATE_ARMED")
     code, shown = at_terminal(f"{' '.join(hosts.within)} {PARAMOVE} arm estop", "", launcher.environment)
     assert code == 0, shown
@@ -262,7 +267,8 @@ class Happened:
 @pytest.mark.parametrize("number", SIGNALS)
 @pytest.mark.parametrize("victim", VICTIMS)
 def test_a_killed_or_stopped_process_on_either_host(launcher, hosts, arm_watch, tmp_path, victim, number, moment):
-    started = launcher.start("dynamixel_arm", "--headless", "--with", "emulated", "--with", overlay(tmp_path, ARM_AWAY))
+    file = overlay(tmp_path, ARM_AWAY + (GOES_ON if victim.startswith("relay") else ""))
+    started = launcher.start("dynamixel_arm", "--headless", "--with", "emulated", "--with", file)
     happened = Happened(launcher)
     seen = victim if victim in NODES.nodes or victim.startswith("relay") else "recorder"
     arm_watch.until(lambda: happened.of(seen, "started"))
