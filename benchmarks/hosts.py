@@ -33,12 +33,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # run as a prog
 from benchmarks.bus_soak import batch
 from paramove.bus import Bus, BusSettings, BusVisitor, topics
 from paramove.hosts import HostKeys, Peer, Relay, RelaySettings
-from tests.hosts.conftest import free_ports
 
 COMMANDS = topics.WIRE_HOAP3_STREAM  # does not cross in a run; here it is a message of the usual size
 IMAGES = topics.CAMERA_IMAGE
 SETTLE_S = 2.0
 IMAGE_BYTES = 60_000
+FIRST_PORT = 47_200
 
 
 def relay(folder: str, name: str, settings: dict[str, Any], watched: bool, results: Connection) -> None:
@@ -83,7 +83,7 @@ def hosts(root: Path, count: int) -> Iterator[tuple[Path, list[tuple[str, Path, 
     """Folder of the giving host, and name, folder and settings of each relay, the giving one first."""
     names = ["giver", *(f"host_{number}" for number in range(count))]
     keys = {name: HostKeys(root / name / "keys") for name in names}
-    ports = {name: free_ports() for name in names}
+    ports = {name: FIRST_PORT + 2 * index for index, name in enumerate(names)}
     rows = {topic.name: topic.name for topic in (COMMANDS, IMAGES)}
     relays = []
     for name in names:

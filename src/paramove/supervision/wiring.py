@@ -63,12 +63,16 @@ def clock_publisher(interfaces: Mapping[str, Interface]) -> str | None:
 
 
 def unpublished(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[tuple[str, Topic]]:
-    """Each node with a topic that it subscribes to and that no node publishes; status topics come from every node."""
+    """Each node with a topic that it subscribes to and that no node publishes; status topics come from every node.
+
+    Nor are those missing that relays publish, on several hosts.
+    """
     published = {on_bus(launch, name, topic) for name, interface in interfaces.items() for topic in interface.publishes}
     for name, interface in interfaces.items():
         for topic in interface.subscribes:
             subscribed = on_bus(launch, name, topic)
-            if subscribed not in published and not subscribed.startswith("status/"):
+            by_all = subscribed.startswith("status/") or topic in topics.BY_RELAYS
+            if subscribed not in published and not by_all:
                 yield name, topic
 
 
