@@ -50,6 +50,7 @@ def relay(folder: str, name: str, settings: dict[str, Any], watched: bool, resul
         BusVisitor(Path(folder), "benchmark") as visitor,
     ):
         subscribers = [visitor.subscriber(topic) for topic in (COMMANDS, IMAGES)] if watched else []
+        results.send("ready")
         while not results.poll():
             its.step()
             bus.idle(0.0)
@@ -63,6 +64,7 @@ def direct(folder: str, results: Connection) -> None:
     latencies_ms: dict[str, list[float]] = {COMMANDS.name: [], IMAGES.name: []}
     with BusVisitor(Path(folder), "benchmark") as visitor:
         subscribers = [visitor.subscriber(topic) for topic in (COMMANDS, IMAGES)]
+        results.send("ready")
         while not results.poll():
             subscribers[0].socket.poll(5)
             collect(subscribers, latencies_ms)
@@ -115,9 +117,10 @@ def measure(count: int, seconds: float, with_relays: bool) -> dict[str, Any]:
         with BusVisitor(folder, "benchmark") as visitor:
             publishers = [visitor.publisher(COMMANDS), visitor.publisher(IMAGES)]
             image = CompressedImage(data=b"\1" * IMAGE_BYTES)
-            settled_s = time.monotonic() + SETTLE_S + 0.5 * count
+            for pipe in pipes:
+                pipe.recv()
             begun_s = time.monotonic()
-            for number in range(round(100 * (settled_s - begun_s + seconds))):
+            for number in range(round(100 * (SETTLE_S + seconds))):
                 due_s = begun_s + 0.01 * number
                 time.sleep(max(0.0, due_s - time.monotonic()))
                 now_ns = time.monotonic_ns()

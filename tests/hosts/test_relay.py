@@ -13,7 +13,7 @@ import pytest
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.bus import topics
-from paramove.hosts import HostKeyError, link
+from paramove.hosts import HostKeyError, HostKeys, link
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.rule_pb2 import Rule, Rules, Speech
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
@@ -86,6 +86,20 @@ def test_images_cross_too_and_only_the_latest_waits_for_a_slow_reader(two_hosts)
     assert [one.message.width for one in received] == [1, 2, 20]
     assert all(one.message.data == pixels for one in received)
     assert subscriber.counter.lost == 17
+
+
+def test_a_topic_crosses_to_each_of_several_hosts(two_hosts, tmp_path):
+    hosts = two_hosts((topics.SPEECH,))
+    third = HostKeys(tmp_path / "third").own().public
+    hosts.keys["here"].trust("third", third)
+    peers = hosts.settings["here"].peers
+    peers = {**peers, "third": peers["there"].model_copy(update={"key": third, "port": free_ports()})}
+    hosts.settings["here"] = hosts.settings["here"].model_copy(update={"peers": peers})
+    published, subscriber = hosts.connected(topics.SPEECH)
+    for number in range(100):
+        published.publish(Speech(text=str(number)), 1, 1)
+    hosts.until(lambda: subscriber.counter.messages == 100, subscriber.receive)
+    assert subscriber.counter.lost == 0
 
 
 def test_a_host_gets_and_gives_only_what_the_launch_file_lets_cross(two_hosts):

@@ -107,8 +107,8 @@ class Relay:
         for host, peer in settings.peers.items():
             rows = {name: topics.by_name(row) for name, row in {**peer.wants, **peer.gives}.items()}
             self._topics |= rows
-            for name in peer.wants:
-                self._sources.setdefault(name, _Source(self._here, bus.settings.folder, rows[name], name))
+            for name in peer.wants.keys() - self._sources.keys():  # a topic may cross to several hosts
+                self._sources[name] = _Source(self._here, bus.settings.folder, rows[name], name)
             images = frozenset(name for name in peer.gives if rows[name].is_image)
             self._requests[host] = (
                 Request(away, peer.port, own, peer, frozenset(peer.gives) - images, beat_s),
