@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 import psutil
+import zmq
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from rich.console import Console
 from rich.table import Table
@@ -41,42 +42,35 @@ IMAGE_BYTES = 60_000
 FIRST_PORT = 47_200
 
 
-def relay(folder: str, name: str, settings: dict[str, Any], watched: bool, results: Connection) -> None:
-    """A host's relay in a process of its own, with a subscriber if it is `watched`, until the parent sends a word."""
-    latencies_ms: dict[str, list[float]] = {COMMANDS.name: [], IMAGES.name: []}
-    with (
-        Bus(f"relay_{name}", BusSettings(folder=Path(folder))) as bus,
-        Relay(bus, RelaySettings.model_validate(settings)) as its,
-        BusVisitor(Path(folder), "benchmark") as visitor,
-    ):
-        subscribers = [visitor.subscriber(topic) for topic in (COMMANDS, IMAGES)] if watched else []
+def relay(folder: str, name: str, settings: dict[str, Any], results: Connection) -> None:
+    """A host's relay in a process of its own, until the parent sends a word."""
+    with Bus(f"relay_{name}", BusSettings(folder=Path(folder))) as bus, Relay(bus, RelaySettings(**settings)) as its:
         results.send("ready")
         while not results.poll():
             its.step()
             bus.idle(0.0)
-            collect(subscribers, latencies_ms)
-        lost = sum(subscriber.counter.lost for subscriber in subscribers)
-    results.send((latencies_ms, lost, sum(psutil.Process().cpu_times()[:2])))
+    results.send(sum(psutil.Process().cpu_times()[:2]))
 
 
-def direct(folder: str, results: Connection) -> None:
-    """A subscriber beside the publisher."""
+def subscriber(folder: str, results: Connection) -> None:
+    """A subscriber in a process of its own."""
     latencies_ms: dict[str, list[float]] = {COMMANDS.name: [], IMAGES.name: []}
     with BusVisitor(Path(folder), "benchmark") as visitor:
         subscribers = [visitor.subscriber(topic) for topic in (COMMANDS, IMAGES)]
+        poller = zmq.Poller()
+        for one in subscribers:
+            poller.register(one.socket, zmq.POLLIN)
         results.send("ready")
         while not results.poll():
-            subscribers[0].socket.poll(5)
+            poller.poll(50)
             collect(subscribers, latencies_ms)
-        lost = sum(subscriber.counter.lost for subscriber in subscribers)
-    results.send((latencies_ms, lost, 0.0))
+        results.send((latencies_ms, sum(one.counter.lost for one in subscribers)))
 
 
 def collect(subscribers: list[Any], latencies_ms: dict[str, list[float]]) -> None:
     """What has come in, with its age: the captured time crosses unchanged on one machine but for the clock's bound."""
-    for subscriber in subscribers:
-        subscriber.revive()
-        while (received := subscriber.receive()) is not None:
+    for one in subscribers:
+        while (received := one.receive()) is not None:
             latencies_ms[received.topic.name].append(1e-6 * (time.monotonic_ns() - received.captured_ns))
 
 
@@ -106,13 +100,15 @@ def measure(count: int, seconds: float, with_relays: bool) -> dict[str, Any]:
     """Latencies over all hosts, and the giving relay's processor time per second."""
     make = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory(prefix="pm-") as root, hosts(Path(root), count) as (folder, relays):
+        started: list[tuple[Any, tuple[Any, ...]]] = [
+            (relay, (str(its), name, settings)) for name, its, settings in relays if with_relays
+        ]
+        started += [(subscriber, (str(its if with_relays else folder),)) for _, its, _ in relays[1:]]
         children, pipes = [], []
-        for index, (name, its, settings) in enumerate(relays if with_relays else relays[1:]):
+        for target, arguments in started:
             here, there = make.Pipe()
-            arguments = (str(its), name, settings, index > 0, there) if with_relays else (str(folder), there)
-            child = make.Process(target=relay if with_relays else direct, args=arguments)
-            child.start()
-            children.append(child)
+            children.append(make.Process(target=target, args=(*arguments, there)))
+            children[-1].start()
             pipes.append(here)
         with BusVisitor(folder, "benchmark") as visitor:
             publishers = [visitor.publisher(COMMANDS), visitor.publisher(IMAGES)]
@@ -133,21 +129,18 @@ def measure(count: int, seconds: float, with_relays: bool) -> dict[str, Any]:
         results = [pipe.recv() for pipe in pipes]
         for child in children:
             child.join()
-    last = round(100 * seconds)
+    last, received = round(100 * seconds), results[-count:]
     samples = {
-        name: np.concatenate(
-            [latencies[name][-(last if name == COMMANDS.name else last // 7) :] for latencies, *_ in its]
-        )
-        for name in (COMMANDS.name, IMAGES.name)
-        for its in [results[1:] if with_relays else results]
+        name: np.concatenate([latencies[name][-some:] for latencies, _ in received])
+        for name, some in ((COMMANDS.name, last), (IMAGES.name, last // 7))
     }
     return {
         "hosts": count,
         "kind": "relays" if with_relays else "direct",
         "commands_ms": np.percentile(samples[COMMANDS.name], [50, 99]).round(2).tolist(),
         "images_ms": np.percentile(samples[IMAGES.name], [50, 99]).round(2).tolist(),
-        "lost": sum(lost for _, lost, _ in results),
-        "giver_cpu": round(results[0][2] / (ended_s - begun_s), 3) if with_relays else None,
+        "lost": sum(lost for _, lost in received),
+        "giver_cpu": round(results[0] / (ended_s - begun_s), 3) if with_relays else None,
     }
 
 
