@@ -23,7 +23,7 @@ demo: setup ## the robot learns where three objects belong and tidies them up, i
 test: setup ## all tests that need neither hardware nor minutes each, several at once
 	@$(ONE_THREAD) $(BIN)/python -m pytest -m "not hardware and not long" -n $(WORKERS) --dist worksteal $(ARGS)
 
-test-long: setup ## tests that take minutes each: a rehearsal in real time, and everything that can go wrong at the table
+test-long: setup ## tests that take minutes each (hours in all): rehearsals in real time, what can go wrong at the table, two hosts
 	@$(ONE_THREAD) $(BIN)/python -m pytest -m long $(ARGS)
 
 test-hardware: setup ## tests of a real servo arm, which moves a little: make test-hardware PORT=/dev/serial/by-id/… ROBOT=koch_v1_1
