@@ -25,15 +25,8 @@ case ${1:-} in
         # shellcheck disable=SC2086
         until { echo "camera-pc $(cut -d " " -f 1,2 "$keys/host.pub")" >"$HOME/.ssh/known_hosts"; } 2>/dev/null &&
             .venv/bin/paramove host trust camera-pc $there; do sleep 1; done
-        cat >"$HOME/two_hosts.yaml" <<EOF
-hosts:
-  robot_pc: {}
-  camera_pc: {ssh: camera-pc, folder: $PWD, command: $PWD/.venv/bin/paramove}
-nodes:
-  camera: {host: camera_pc}
-  colour_tracker: {host: camera_pc}
-EOF
-        exec .venv/bin/paramove launch "$@" --with "$HOME/two_hosts.yaml"
+        echo "hosts: {camera_pc: {folder: $PWD, command: $PWD/.venv/bin/paramove}}" >"$HOME/folder.yaml"
+        exec .venv/bin/paramove launch "$@" --with two_hosts --with "$HOME/folder.yaml"
         ;;
     *)
         sed -n '2,5s/^# \{0,1\}//p' "$0" >&2

@@ -21,7 +21,7 @@ def run(bus: Bus, config: Config) -> None:
         while not bus.stopped:
             relay.step()
             bus.idle(0.0)
-            bus.degraded(relay.trouble) if relay.trouble else bus.ready(relay.detail)
+            bus.degraded(trouble) if (trouble := relay.trouble) else bus.ready(relay.detail)
 
 
 if __name__ == "__main__":

@@ -137,7 +137,7 @@ def test_the_commands_of_the_tutorial(launcher, hosts):
         ["launch", "rule_learning"],
         ["launch", "dynamixel_arm"],
     ]
-    trust = lines[0].replace("camera-pc", "robot-pc")  # the text says so
+    trust = lines[0].replace("camera-pc", "robot-pc")  # as the text requests
     for line in (*lines[:2], trust, *(f"{line} --headless --runs {launcher.folder}" for line in lines[2:])):
         typed = [*hosts.within, *line.split()]
         done = subprocess.run(typed, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)

@@ -277,7 +277,6 @@ class Relay:
             if self._real_time and envelope.has_message:
                 clock = self._requests[host][0].clock
                 envelope, message = in_own_time(topic, envelope, payload, clock, now_ns)
-                payload = message.SerializeToString(deterministic=True)
             elif away is not None and envelope.has_message:
                 message = topic.type.FromString(payload)
         except (RejectedError, DecodeError, UnknownTimeError) as error:
@@ -286,6 +285,7 @@ class Relay:
                 _log.warning("topic %s: message from %s rejected: %s (number %d)", name, host, error, request.rejected)
             return
         if away is None:
+            payload = payload if message is None else message.SerializeToString(deterministic=True)
             self._publisher(topic, name).forward(envelope._replace(flags=envelope.flags & ~FLAG_RING), payload)
         elif message is not None and self._latest.get((host, name)) != (envelope.epoch, envelope.sequence):
             self._latest[host, name] = envelope.epoch, envelope.sequence  # a new link repeats the last one

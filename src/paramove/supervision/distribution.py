@@ -137,25 +137,18 @@ def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostK
     }
     clock = next((nodes[name].host or own for name, its in interfaces.items() if CLOCK in its.publishes), own)
     for name, host in file.hosts.items():
-        others = {
-            other: peer.model_copy(
-                update={
-                    "wants": crosses.get((name, other), {}),
-                    "gives": crosses.get((other, name), {}),
-                    "commands": not file.bus.lockstep
-                    and not _COMMANDS.isdisjoint(crosses.get((other, name), {}).values()),
-                }
-            )
-            for other, peer in peers.items()
-            if crosses.get((name, other)) or crosses.get((other, name))
-        }
+        others = {}
+        for other, peer in peers.items():
+            wants, gives = crosses.get((name, other), {}), crosses.get((other, name), {})
+            commands = not file.bus.lockstep and not _COMMANDS.isdisjoint(gives.values())
+            if wants or gives:
+                others[other] = peer.model_copy(update={"wants": wants, "gives": gives, "commands": commands})
         if not others:
             continue
         clock_from = clock if file.bus.lockstep and name != clock else None
         settings = RelaySettings(address=peers[name].address, port=host.port, peers=others, clock_from=clock_from)
-        for node, its in interfaces.items():
-            is_here = (file.nodes[node].host or own) == name
-            if is_here and topics.HOSTS_LINK in its.subscribes and any(peer.commands for peer in others.values()):
+        for node, its in interfaces.items() if any(peer.commands for peer in others.values()) else ():
+            if (file.nodes[node].host or own) == name and topics.HOSTS_LINK in its.subscribes:
                 limit = {"link_timeout_s": LINK_TIMEOUT_S, **file.nodes[node].parameters}
                 nodes[node] = nodes[node].model_copy(update={"parameters": limit})
         nodes[_relay(name)] = NodeSettings(
