@@ -23,7 +23,7 @@ class ContactRecord:
     Attributes:
         unwanted: Contacts begun between the robot and anything but the object it handles, itself included.
         unwanted_pairs: "a - b" -> how often.
-        deepest: Largest penetration between robot and objects, m; `deepest_pair` where.
+        deepest: Largest penetration between robot and objects, m.
         touched: Objects that the robot touched in the latest step.
         present: Pairs of the robot in contact in the latest step.
     """
@@ -31,7 +31,6 @@ class ContactRecord:
     unwanted: int = 0
     unwanted_pairs: dict[str, int] = field(default_factory=dict)
     deepest: float = 0.0
-    deepest_pair: str = ""
     touched: tuple[str, ...] = ()
     present: tuple[tuple[int, int], ...] = ()
 
@@ -96,8 +95,7 @@ class ContactWatch:
             touched = self._object_of.get(other)
             if touched is not None:
                 sides.setdefault(touched, set()).add(self._side.get(robot, "other"))
-                if -dist > record.deepest:
-                    record.deepest, record.deepest_pair = -dist, self.name_of((robot, other))
+                record.deepest = max(record.deepest, -dist)
         held = [name for name, touching in sides.items() if len(touching - {"other"}) > 1]
         if held:
             self._held = held[0]

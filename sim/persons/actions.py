@@ -61,14 +61,6 @@ def far_place(coordinates: ArrayLike) -> Floats:
     return np.stack([np.full_like(u, x), y - FAR_SPAN[0] * u, z + FAR_SPAN[1] * v], axis=-1)
 
 
-def far_coordinates(places: ArrayLike) -> Floats:
-    """The inverse of `far_place` for places (..., 3), m, in the plane. Shape (..., 2)."""
-    place = np.asarray(places, dtype=np.float64)
-    return np.stack(
-        [(FAR_ORIGIN[1] - place[..., 1]) / FAR_SPAN[0], (place[..., 2] - FAR_ORIGIN[2]) / FAR_SPAN[1]], axis=-1
-    )
-
-
 def fingertip_towards(target: Floats, lengths: ArmLengths) -> Floats:
     """Where a person with `lengths` holds the fingertip to point at a far target (3,): before the eye. (3,), m."""
     reach = FAR_REACH * (lengths.upper_arm + lengths.forearm + lengths.fingertip)

@@ -77,10 +77,10 @@ def test_pouring_puts_the_glass_back():
         assert near[at_pot:].any()
 
 
-def test_far_plane_and_its_coordinates():
-    theta = np.array([[0.0, 0.0], [0.3, 0.8], [1.0, 1.0]])
-    places = actions.far_place(theta)
-    np.testing.assert_allclose(actions.far_coordinates(places), theta, rtol=0.0, atol=1e-12)
+def test_far_plane():
+    places = actions.far_place(np.array([[0.0, 0.0], [0.3, 0.8], [1.0, 1.0]]))
+    np.testing.assert_allclose(places[[0, -1], 1] - actions.FAR_ORIGIN[1], [0.0, -actions.FAR_SPAN[0]], atol=1e-12)
+    np.testing.assert_allclose(places[[0, -1], 2] - actions.FAR_ORIGIN[2], [0.0, actions.FAR_SPAN[1]], atol=1e-12)
     assert (np.diff(places[:, 1]) < 0).all(), "u runs to the right"
     assert (np.diff(places[:, 2]) > 0).all(), "v runs upwards"
 
