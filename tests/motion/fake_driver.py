@@ -149,7 +149,8 @@ class FakeDriver:
     def measured(self) -> JointStates:
         """All joints; the fingers stop on what is held."""
         xi = max(self.opening, HELD_OPENING) if self.held else self.opening
-        values = [*self.angles[:5], ARM.fingers_angle(float(np.clip(xi, 0.0, 1.0)))]
+        fingers = ARM.fingers_closed + float(np.clip(xi, 0.0, 1.0)) * (ARM.fingers_open - ARM.fingers_closed)
+        values = [*self.angles[:5], fingers]
         return JointStates(
             joints=[
                 JointState(name=name, position=q) for name, q in zip([*ARM.joints, ARM.fingers], values, strict=True)

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
 
+X, Y, Z = 0, 1, 2
+
 
 @dataclass(frozen=True)
 class ArmPoints:
@@ -23,7 +25,6 @@ class ArmPoints:
 
     elbow: Floats
     gripper: Floats
-    fingertip: Floats
     shoulder_from_hand: Floats
 
 
@@ -34,12 +35,10 @@ class ArmKinematics:
     Attributes:
         upper_arm: Shoulder to elbow, m.
         gripper_from_elbow: Centre of a held 20 mm cylinder, from the elbow, zero pose, [3], m.
-        fingertip_from_elbow: Fingertip, likewise.
     """
 
     upper_arm: float
     gripper_from_elbow: tuple[float, float, float]
-    fingertip_from_elbow: tuple[float, float, float]
 
     def forward(self, angles: ArrayLike) -> ArmPoints:
         """Where the arm's points are.
@@ -53,37 +52,21 @@ class ArmKinematics:
         q = np.asarray(angles, dtype=np.float64)
         if q.ndim == 0 or q.shape[-1] != 5:
             raise ValueError(f"angles have shape {q.shape}; the last axis must hold the arm's 5 joints")
-        shoulder_from_upper_arm = rotation_y(q[..., 0]) @ rotation_z(q[..., 1]) @ rotation_x(q[..., 2])
-        shoulder_from_hand = shoulder_from_upper_arm @ rotation_y(q[..., 3]) @ rotation_x(q[..., 4])
+        shoulder_from_upper_arm = _rotation(Y, q[..., 0]) @ _rotation(Z, q[..., 1]) @ _rotation(X, q[..., 2])
+        shoulder_from_hand = shoulder_from_upper_arm @ _rotation(Y, q[..., 3]) @ _rotation(X, q[..., 4])
         elbow = self.upper_arm * shoulder_from_upper_arm[..., :, 0]
         return ArmPoints(
             elbow=elbow,
             gripper=elbow + shoulder_from_hand @ np.asarray(self.gripper_from_elbow),
-            fingertip=elbow + shoulder_from_hand @ np.asarray(self.fingertip_from_elbow),
             shoulder_from_hand=shoulder_from_hand,
         )
 
 
-def rotation_x(angle: ArrayLike) -> Floats:
-    """Rotation matrices about x, [..., 3, 3], for angles [...] in rad."""
-    return _rotation(angle, 1, 2)
-
-
-def rotation_y(angle: ArrayLike) -> Floats:
-    """Rotation matrices about y, [..., 3, 3], for angles [...] in rad."""
-    return _rotation(angle, 2, 0)
-
-
-def rotation_z(angle: ArrayLike) -> Floats:
-    """Rotation matrices about z, [..., 3, 3], for angles [...] in rad."""
-    return _rotation(angle, 0, 1)
-
-
-def _rotation(angle: ArrayLike, first: int, second: int) -> Floats:
-    """Rotation that turns axis `first` towards axis `second`."""
-    angle = np.asarray(angle, dtype=np.float64)
+def _rotation(axis: int, angle: Floats) -> Floats:
+    """Rotation matrices about an axis, [..., 3, 3], for angles [...] in rad."""
+    first, second = (axis + 1) % 3, (axis + 2) % 3  # it turns the first towards the second
     matrix = np.zeros((*angle.shape, 3, 3))
-    matrix[..., :, :] = np.eye(3)
+    matrix[...] = np.eye(3)
     cosine, sine = np.cos(angle), np.sin(angle)
     matrix[..., first, first] = cosine
     matrix[..., second, second] = cosine

@@ -76,13 +76,7 @@ class Arm:
     holding_openings: tuple[float, float]
     sites: ArmSites
     kinematics: ArmKinematics
-    above_table: AboveTable | None = None
-
-    def fingers_angle(self, xi: float) -> float:
-        """Angle of the finger joint for the opening `xi` in 0 (closed) to 1 (open), rad."""
-        if not 0.0 <= xi <= 1.0:
-            raise ValueError(f"opening of the hand {xi!r} is outside 0 (closed) to 1 (open)")
-        return self.fingers_closed + xi * (self.fingers_open - self.fingers_closed)
+    above_table: AboveTable | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,7 +291,7 @@ def _arm(names: tuple[str, ...], arm: ArmPart) -> Arm:
         felt_opening=arm.fingers.felt_opening,
         holding_openings=arm.fingers.holding_openings,
         sites=arm.sites,
-        kinematics=ArmKinematics(arm.upper_arm, arm.gripper_from_elbow, arm.fingertip_from_elbow),
+        kinematics=ArmKinematics(arm.upper_arm, arm.gripper_from_elbow),
         above_table=None if arm.above_table is None else _above_table(arm.above_table),
     )
 

@@ -5,6 +5,7 @@ Thesis table 5.1: +-209 counts per degree for the geared joints, 0 to 120 for th
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +61,11 @@ class JointUnits:
         counts = np.rint(self.zero_counts + self.counts_per_rad * values)
         low, high = self.counts_range()
         slack = np.abs(self.counts_per_rad) * beyond
-        self._reject_first(values, (counts < low - slack) | (counts > high + slack))
+        self._reject_first(
+            values,
+            (counts < low - slack) | (counts > high + slack),
+            lambda joint, angle: f"{np.rad2deg(angle):.3f} deg is outside its range {self._range_deg(joint)}",
+        )
         return counts.astype(np.int16)
 
     def to_radians(self, counts: ArrayLike) -> Floats:
@@ -76,30 +81,26 @@ class JointUnits:
             JointRangeError: Wrong number of joints, not finite, not an integer, or beyond 16 bits.
         """
         values = self._checked(counts, "counts")
-        bad = (values != np.rint(values)) | (values < INT16_RANGE[0]) | (values > INT16_RANGE[1])
-        if bad.any():
-            index = tuple(int(i) for i in np.argwhere(bad)[0])
-            raise JointRangeError(
-                f"joint {self.names[index[-1]]}: {values[index]!r} is not an integer unit of 16 bits "
-                f"({INT16_RANGE[0]} to {INT16_RANGE[1]})"
-            )
+        low, high = INT16_RANGE
+        self._reject_first(
+            values,
+            (values != np.rint(values)) | (values < low) | (values > high),
+            lambda _, value: f"{value!r} is not an integer unit of 16 bits ({low} to {high})",
+        )
         return np.asarray((values - self.zero_counts) / self.counts_per_rad, dtype=np.float64)
+
+    def _range_deg(self, joint: int) -> str:
+        return f"{np.rad2deg(self.lower[joint]):.3f} to {np.rad2deg(self.upper[joint]):.3f} deg"
 
     def _checked(self, values: ArrayLike, what: str) -> Floats:
         array = np.asarray(values, dtype=np.float64)
         if array.ndim == 0 or array.shape[-1] != len(self.names):
             raise JointRangeError(f"{what} have shape {array.shape}; the last axis must hold {len(self.names)} joints")
-        if not np.isfinite(array).all():
-            index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-            raise JointRangeError(f"joint {self.names[index[-1]]}: {array[index]} is not a finite number")
+        self._reject_first(array, ~np.isfinite(array), lambda _, value: f"{value} is not a finite number")
         return array
 
-    def _reject_first(self, angles: Floats, bad: NDArray[np.bool_]) -> None:
-        if not bad.any():
-            return
-        index = tuple(int(i) for i in np.argwhere(bad)[0])
-        joint = index[-1]
-        raise JointRangeError(
-            f"joint {self.names[joint]}: {np.rad2deg(angles[index]):.3f} deg is outside its range "
-            f"{np.rad2deg(self.lower[joint]):.3f} to {np.rad2deg(self.upper[joint]):.3f} deg"
-        )
+    def _reject_first(self, values: Floats, bad: NDArray[np.bool_], why: Callable[[int, float], str]) -> None:
+        """Raise for the first bad value; `why` gets the index of its joint and the value."""
+        if bad.any():
+            index = tuple(int(i) for i in np.argwhere(bad)[0])
+            raise JointRangeError(f"joint {self.names[index[-1]]}: {why(index[-1], values[index])}")

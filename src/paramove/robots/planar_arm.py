@@ -36,16 +36,6 @@ class OutOfReachError(ValueError):
         self.position = position
 
 
-def describe_miss(names: tuple[str, ...], lower: Floats, upper: Floats, solutions: Floats) -> str:
-    """Why none of the solutions [S, J], some of them nan, is within the limits: the joint of the smallest excess."""
-    finite = solutions[np.isfinite(solutions).all(axis=-1)]
-    beyond = np.maximum(lower - finite, finite - upper)
-    best = beyond.max(axis=-1).argmin()
-    joint = int(beyond[best].argmax())
-    angle, minimum, maximum = np.rad2deg([finite[best, joint], lower[joint], upper[joint]])
-    return f"{names[joint]} would have to turn to {angle:.1f} deg, its range is {minimum:.1f} to {maximum:.1f} deg"
-
-
 Numbers = Floats | np.float64
 
 
@@ -254,8 +244,16 @@ class PlanarArm:
         return np.asarray(self._within(self._solutions(goal, pitch, roll, None)).any(axis=-1))
 
     def _cause(self, goal: Floats, pitch: float, roll: float, solutions: Floats) -> str:
-        if np.isfinite(solutions).all(axis=-1).any():
-            return describe_miss(self.names, self.lower, self.upper, solutions)
+        """Why none of the solutions [S, J], some of them nan, is within the limits."""
+        finite = solutions[np.isfinite(solutions).all(axis=-1)]
+        if len(finite):
+            beyond = np.maximum(self.lower - finite, finite - self.upper)
+            best = beyond.max(axis=-1).argmin()  # with the smallest excess, of its worst joint
+            joint = int(beyond[best].argmax())
+            angle, low, high = np.rad2deg([finite[best, joint], self.lower[joint], self.upper[joint]])
+            return (
+                f"{self.names[joint]} would have to turn to {angle:.1f} deg, its range is {low:.1f} to {high:.1f} deg"
+            )
         with np.errstate(invalid="ignore"):
             away = np.linalg.norm(self._wrist(goal, np.float64(pitch), roll, 1.0)[1])
         if np.isnan(away):
