@@ -22,7 +22,7 @@ import numpy as np
 
 from paramove.documents import Floats
 from paramove.robots import RobotDescription
-from paramove.robots.streaming import StreamBatch, StreamReader, StreamWriter
+from paramove.robots.streaming import StreamBatch, StreamReader
 from paramove.safety import longest_path_s, stop_ramp
 
 EPOCH = 3
@@ -68,7 +68,7 @@ class Swing:
         rows = self.path[first : first + cover]
         ahead = self.path[first + cover :][: int(np.ceil(longest_path_s(self.limits) / self.limits.dt_s))]
         ramp = stop_ramp(rows[-1], ahead, self.limits) if len(ahead) else rows[:0]
-        return StreamWriter(self.robot, EPOCH).batch(first, np.concatenate([rows, ramp]), len(ramp))
+        return StreamBatch.of(self.robot, EPOCH, first, np.concatenate([rows, ramp]), len(ramp))
 
 
 @cache

@@ -16,7 +16,7 @@ from paramove.msgs.rule_pb2 import Speech
 from paramove.objects.colour_tracker import ColourTracker
 from paramove.robots.description import RobotDescription
 from paramove.robots.hoap3.wire import batch_message
-from paramove.robots.streaming.stream import StreamWriter
+from paramove.robots.streaming.stream import StreamBatch
 from sim import looks, tool_box
 from sim.simulation import Simulation, step_of_tick
 from sim.world import OPENINGS_UP, World
@@ -54,7 +54,7 @@ def test_robot_plays_the_stream_and_reports_it(description: RobotDescription) ->
     rows = np.repeat(description.base_pose[None], 400, axis=0)
     share = np.clip(np.arange(400) / 300, 0, 1)
     rows[:, wrist] -= np.deg2rad(30) * share**3 * (10 - 15 * share + 6 * share**2)
-    batch = StreamWriter(description, epoch=7).batch(0, rows, ramp_rows=100)
+    batch = StreamBatch.of(description, 7, 0, rows, 100)
     simulation.handle(_heard(topics.WIRE_HOAP3_STREAM, batch_message(batch)))
     assert not simulation.robot.stream.rejection
     simulation.run_to_tick(3)
@@ -74,7 +74,7 @@ def test_a_bad_batch_is_refused_and_reported(description: RobotDescription) -> N
     rows = np.repeat(description.base_pose[None], 50, axis=0)
     rows[20:, description.index("right_elbow")] += np.deg2rad(5.0)  # a jump
     rows[20:, description.index("right_elbow")] -= np.deg2rad(10.0)
-    batch = StreamWriter(description, epoch=7).batch(0, rows, 10)
+    batch = StreamBatch.of(description, 7, 0, rows, 10)
     simulation.handle(_heard(topics.WIRE_HOAP3_STREAM, batch_message(batch)))
     state = simulation.shown()[topics.WIRE_HOAP3_STATE]
     assert state.rejected_batches == 1

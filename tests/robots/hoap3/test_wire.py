@@ -9,7 +9,7 @@ import pytest
 
 from paramove.msgs import hoap3_wire_pb2 as wire
 from paramove.robots.hoap3.wire import batch_message, receive, state_message, state_of
-from paramove.robots.streaming.stream import Playing, StreamReader, StreamWriter
+from paramove.robots.streaming.stream import Playing, StreamBatch, StreamReader
 from tests.robots.hoap3.movements import HOAP3, swing
 
 PATH = swing(HOAP3, duration_s=1.2)
@@ -21,7 +21,7 @@ def reader() -> StreamReader:
 
 
 def sent() -> wire.StreamBatch:
-    message = batch_message(StreamWriter(HOAP3, 7).batch(0, PATH[1:], 20))
+    message = batch_message(StreamBatch.of(HOAP3, 7, 0, PATH[1:], 20))
     return wire.StreamBatch.FromString(message.SerializeToString())
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paramove.robots.joint_units import JointRangeError
-from paramove.robots.streaming.stream import Playing, StreamBatch, StreamReader, StreamWriter
+from paramove.robots.streaming.stream import Playing, StreamBatch, StreamReader
 from paramove.safety.stopping import stop_ramp
 from tests.robots.hoap3.movements import HOAP3, swing
 
@@ -28,7 +28,7 @@ def cut(first: int, cover: int, epoch: int = EPOCH) -> StreamBatch:
     rows = PATH[1:][first : first + cover]
     ahead = PATH[1:][first + cover : first + cover + 400]
     ramp = stop_ramp(rows[-1], ahead, LIMITS) if len(ahead) else rows[:0]
-    return StreamWriter(HOAP3, epoch).batch(first, np.concatenate([rows, ramp]), len(ramp))
+    return StreamBatch.of(HOAP3, epoch, first, np.concatenate([rows, ramp]), len(ramp))
 
 
 def played_to_rest(robot: StreamReader) -> np.ndarray:
@@ -128,12 +128,12 @@ def test_late_duplicated_and_foreign_batches_are_refused_while_playing() -> None
         assert reason in robot.rejection
     assert robot.playing == Playing.FRAMES
     played_to_rest(robot)
-    assert robot.offer(StreamWriter(HOAP3, 8).batch(0, HOAP3.units.to_radians(robot.target)[None], 0))
+    assert robot.offer(StreamBatch.of(HOAP3, 8, 0, HOAP3.units.to_radians(robot.target)[None], 0))
 
 
 def test_a_movement_that_ends_without_a_ramp_is_refused() -> None:
     robot = reader()
-    assert not robot.offer(StreamWriter(HOAP3, EPOCH).batch(0, PATH[1:500], 0))
+    assert not robot.offer(StreamBatch.of(HOAP3, EPOCH, 0, PATH[1:500], 0))
     assert "speed changes" in robot.rejection
 
 
@@ -151,7 +151,7 @@ def test_counts_beyond_16_bits_never_become_a_batch() -> None:
     rows = np.repeat(PATH[:1], 3, axis=0)
     rows[1, 6] = np.deg2rad(40_000 / 209)
     with pytest.raises(JointRangeError, match="right_shoulder_pitch"):
-        StreamWriter(HOAP3, EPOCH).batch(0, rows, 0)
+        StreamBatch.of(HOAP3, EPOCH, 0, rows, 0)
 
 
 def test_more_frames_than_the_buffer_takes_are_refused() -> None:
@@ -230,6 +230,6 @@ def test_accelerations_are_judged_over_a_frame_of_10_ms() -> None:
     slow = replace(HOAP3, stream=HOAP3.stream.model_copy(update={"period_us": 10_000}))
     robot = StreamReader(slow, HELD)
     path = PATH[10::10]
-    assert robot.offer(StreamWriter(slow, EPOCH).batch(0, path, 0)), robot.rejection
-    assert not robot.offer(StreamWriter(slow, EPOCH).batch(0, path[:60], 0))
+    assert robot.offer(StreamBatch.of(slow, EPOCH, 0, path, 0)), robot.rejection
+    assert not robot.offer(StreamBatch.of(slow, EPOCH, 0, path[:60], 0))
     assert "counts in 1 frames" in robot.rejection

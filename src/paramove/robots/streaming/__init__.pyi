@@ -4,4 +4,3 @@ from .stream import Playing as Playing
 from .stream import StreamBatch as StreamBatch
 from .stream import StreamReader as StreamReader
 from .stream import StreamState as StreamState
-from .stream import StreamWriter as StreamWriter

@@ -18,9 +18,8 @@ from paramove.documents import Floats
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, SafetyFault, SafetyState, StopRequest
 from paramove.robots import RobotDescription
-from paramove.robots.streaming.execution import Execution
-from paramove.robots.streaming.robot_report import RobotReport
-from paramove.robots.streaming.stream import StreamBatch, StreamState, StreamWriter
+from paramove.robots.streaming.execution import Execution, RobotReport
+from paramove.robots.streaming.stream import StreamBatch, StreamState
 from paramove.safety import (
     PERSON_STOP,
     TOUCHED,
@@ -123,11 +122,10 @@ class ArmDriver:
 
     def _begin_at(self, start_ns: int) -> None:
         d = self._description
-        epoch = 1 + (start_ns // 1_000_000) % (2**32 - 1)
+        self._epoch = 1 + (start_ns // 1_000_000) % (2**32 - 1)
         self._now_ns = self._began_ns = start_ns
-        self._writer = StreamWriter(d, epoch)
         mechanical = (d.lower, d.upper)
-        self._core = SafetyCore(self._limits, mechanical, epoch, start_ns, self._settings, self._clearance)
+        self._core = SafetyCore(self._limits, mechanical, self._epoch, start_ns, self._settings, self._clearance)
 
     @property
     def state(self) -> State:
@@ -147,8 +145,8 @@ class ArmDriver:
         if report is not None:
             before, execution = self._report, self._execution
             # A first batch is sent until it is known to be played; those rejected meanwhile were not late.
-            begun = before is not None and execution is not None and before.next_index > execution.start_index
-            if before is not None and begun and report.rejected_batches > before.rejected_batches:
+            begun = before is not None and execution is not None and before.stream.next_index > execution.start_index
+            if before is not None and begun and report.stream.rejected_batches > before.stream.rejected_batches:
                 self._guard_ms = min(self._guard_ms + GUARD_STEP_MS, LONGEST_GUARD_MS)
             self._report = report
             self._reported = True
@@ -210,7 +208,7 @@ class ArmDriver:
         self._judge_stops()
         requests: list[ArmingRequest | None] = [*self._arming_requests] or [None]
         self._arming_requests.clear()
-        measured = self._report.measured(self._writer.epoch) if self._report else None
+        measured = self._report.measured(self._epoch) if self._report else None
         cut_off = self._fault_of_link(now_ns)
         stop = self._stop or self._fault_of_stall(stalled_s) or self._fault_of_stream(now_ns)
         if self._core.state is State.ARMED:
@@ -228,10 +226,16 @@ class ArmDriver:
         self._emergency = self._checks_began_ns = None
         if self._core.state is not State.DISCONNECTED:  # there a stop waits for data from the robot
             self._stop = None
-        stream = self._writer.batch(targets.first_index, targets.rows, targets.ramp_rows) if targets else None
+        stream = None
+        if targets is not None:
+            stream = StreamBatch.of(
+                self._description, self._epoch, targets.first_index, targets.rows, targets.ramp_rows
+            )
         self._follow(now_ns)
         statuses, self._statuses = tuple(self._statuses), []
-        joint_states = self._report.joint_states() if self._report and self._reported else None
+        joint_states = (
+            self._report.joint_states(self._description.joint_names) if self._report and self._reported else None
+        )
         self._reported = False
         return DriverOutput(stream, joint_states, statuses, self._safety_state(now_ns))
 
@@ -277,7 +281,8 @@ class ArmDriver:
         if not -MAX_TRAJECTORY_LEAD_S <= age_s <= MAX_TRAJECTORY_AGE_S:
             allowed = f"{-MAX_TRAJECTORY_LEAD_S:g} to {MAX_TRAJECTORY_AGE_S:g} s"
             raise TrajectoryRejectedError("stale", -1, "", f"age {age_s:.2f} s", allowed)
-        held = self._core.held(report.next_index) if report.epoch == self._writer.epoch else None
+        next_index = report.next_index(self._epoch)
+        held = self._core.held(next_index) if report.stream.epoch == self._epoch else None
         path = check_trajectory(
             list(message.joints),
             [point.time_s for point in message.points],
@@ -286,9 +291,8 @@ class ArmDriver:
             self._limits,
             self._start_tolerance,
         )
-        start_index = report.next_index if report.epoch == self._writer.epoch else 0
         self._guard_ms = self._description.stream.guard_ms
-        self._execution = Execution(message.id, path.rows, path.dt_s, start_index, self._now_ns)
+        self._execution = Execution(message.id, path.rows, path.dt_s, next_index, self._now_ns)
         self._add_status(message.id, TrajectoryStatus.STATE_ACCEPTED, 0.0, path.duration_s, "")
 
     def _proposal(self, now_ns: int) -> Proposal | None:
@@ -296,12 +300,11 @@ class ArmDriver:
         if execution is None or report is None:
             return None
         stream = self._description.stream
-        known = report.next_index if report.epoch == self._writer.epoch else 0
         guard, cover = (ms * 1000 // stream.period_us for ms in (self._guard_ms, stream.cover_ms))
-        rows, ahead, first_index = execution.window(known, guard, cover, self._ahead_rows)
+        rows, ahead, first_index = execution.window(report.next_index(self._epoch), guard, cover, self._ahead_rows)
         if not len(rows):
             return None
-        return Proposal(now_ns, self._writer.epoch, self._description.joint_names, first_index, rows, ahead)
+        return Proposal(now_ns, self._epoch, self._description.joint_names, first_index, rows, ahead)
 
     def _fault_of_stall(self, stalled_s: float) -> Fault | None:
         if not stalled_s or self._execution is None or self._core.state is not State.ARMED:
@@ -328,14 +331,14 @@ class ArmDriver:
     def _fault_of_stream(self, now_ns: int) -> Fault | None:
         if self._execution is None or self._report is None or self._core.state is not State.ARMED:
             return None
-        return self._execution.fault(self._report, self._writer.epoch, now_ns)
+        return self._execution.fault(self._report, self._epoch, now_ns)
 
     def _follow(self, now_ns: int) -> None:
         """Report the progress of the trajectory; end it when the robot reports its end."""
         execution, report = self._execution, self._report
         if execution is None or report is None:
             return
-        time_s = execution.time_s(report, self._writer.epoch)
+        time_s = execution.time_s(report, self._epoch)
         name, duration_s = execution.trajectory_id, execution.duration_s
         if self._core.state is State.STOPPING:
             return
@@ -344,7 +347,7 @@ class ArmDriver:
             self._add_status(name, TrajectoryStatus.STATE_STOPPED, time_s, duration_s, reason)
             self._execution = None
             return
-        ending = execution.ending(report, self._writer.epoch, now_ns, self._description)
+        ending = execution.ending(report, self._epoch, now_ns, self._description)
         if ending is not None:
             state = TrajectoryStatus.STATE_STOPPED if ending else TrajectoryStatus.STATE_SUCCEEDED
             self._add_status(name, state, duration_s, duration_s, ending)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +56,16 @@ class StreamBatch:
     frames: Frames
     stop_ramp_frames: int
 
+    @classmethod
+    def of(cls, description: RobotDescription, epoch: int, first_index: int, rows: Floats, ramp_rows: int) -> Self:
+        """Encode rows of joint angles, [N, J] rad, of which the last `ramp_rows` are the stop ramp.
+
+        Raises:
+            JointRangeError: A value that the robot's integer units cannot hold.
+        """
+        frames = description.units.to_counts(rows, BEYOND)
+        return cls(epoch, first_index, description.stream.period_us, frames, ramp_rows)
+
 
 @dataclass(frozen=True, eq=False)
 class StreamState:
@@ -81,30 +92,6 @@ class StreamState:
     target_counts: Ints
     rejected_batches: int
     rejection: str
-
-
-class StreamWriter:
-    """Makes batches of rows of joint angles.
-
-    Args:
-        description: Of the robot.
-        epoch: Of this sender; new at each of its starts, not 0.
-    """
-
-    def __init__(self, description: RobotDescription, epoch: int) -> None:
-        if not 0 < epoch < 2**32:
-            raise ValueError(f"epoch {epoch} of the stream, allowed 1 to {2**32 - 1}")
-        self.epoch = epoch
-        self._units = description.units
-        self._period_us = description.stream.period_us
-
-    def batch(self, first_index: int, rows: Floats, ramp_rows: int) -> StreamBatch:
-        """Encode rows, [N, J] rad, of which the last `ramp_rows` are the stop ramp.
-
-        Raises:
-            JointRangeError: A value that the robot's integer units cannot hold.
-        """
-        return StreamBatch(self.epoch, first_index, self._period_us, self._units.to_counts(rows, BEYOND), ramp_rows)
 
 
 class StreamReader:
@@ -163,8 +150,7 @@ class StreamReader:
     @property
     def target(self) -> Frames:
         """The frame that was played last or is held, [J]."""
-        target: Frames = self._played[-1]
-        return target
+        return np.asarray(self._played[-1])
 
     def play(self) -> Frames:
         """The frame for the next millisecond, [J]; the held one if nothing is left."""
@@ -179,9 +165,7 @@ class StreamReader:
 
     def offer(self, batch: StreamBatch) -> bool:
         """Take a batch, or reject it as a whole and keep the buffer. Returns whether it was taken."""
-        frames = batch.frames
-        reason = self._error_of_form(batch) or self._error_of_index(batch, len(frames))
-        reason = reason or self._error_of_frames(batch, frames)
+        reason = self._error_of_form(batch) or self._error_of_index(batch) or self._error_of_frames(batch)
         if reason:
             self.reject(reason)
             return False
@@ -189,7 +173,7 @@ class StreamReader:
             self.epoch = batch.epoch
             self.next_index = batch.first_index
         n_before = batch.first_index - self.next_index
-        self._coming = np.concatenate([self._coming[:n_before], frames])
+        self._coming = np.concatenate([self._coming[:n_before], batch.frames])
         self._ramp_frames = batch.stop_ramp_frames
         return True
 
@@ -227,7 +211,7 @@ class StreamReader:
             return f"a stop ramp of {batch.stop_ramp_frames} frames, the batch has {n_frames}"
         return ""
 
-    def _error_of_index(self, batch: StreamBatch, n_frames: int) -> str:
+    def _error_of_index(self, batch: StreamBatch) -> str:
         if batch.epoch != self.epoch:
             return "" if self.at_rest else f"epoch {batch.epoch} while {self.epoch} is played; allowed only at rest"
         if batch.first_index < self.next_index:
@@ -235,12 +219,12 @@ class StreamReader:
         end = self.next_index + self.depth
         if batch.first_index > end:
             return f"first index {batch.first_index}, allowed up to {end}: a gap"
-        depth = batch.first_index + n_frames - self.next_index
+        depth = batch.first_index + len(batch.frames) - self.next_index
         return "" if depth <= MAX_FRAMES else f"{depth} frames to be played, allowed {MAX_FRAMES}: the buffer is full"
 
-    def _error_of_frames(self, batch: StreamBatch, frames: Frames) -> str:
+    def _error_of_frames(self, batch: StreamBatch) -> str:
         n_before = batch.first_index - self.next_index if batch.epoch == self.epoch else 0
-        span = self._span
+        frames, span = batch.frames, self._span
         before = np.concatenate([self._played, self._coming[:n_before]])[-2 * span :]
         whole = np.concatenate([before, frames, np.repeat(frames[-1:], 2 * span, axis=0)]).astype(np.float64)
         outside = (frames < self._low) | (frames > self._high)
