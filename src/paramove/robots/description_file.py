@@ -269,7 +269,7 @@ def _check_servos(path: Path, file: RobotFile) -> None:
 
 def _check_models(path: Path, file: RobotFile) -> None:
     """Of the motors, which are named as the servos' models."""
-    from paramove.robots.dynamixel import CURRENT_UNIT_MA, MODELS  # needs the SDK
+    from paramove.robots.dynamixel import MODELS  # needs the SDK
 
     gripper = None if file.chain is None else file.chain.gripper
     current = None if gripper is None else gripper.grip_current_ma
@@ -280,10 +280,11 @@ def _check_models(path: Path, file: RobotFile) -> None:
                 f"{nearest(joint.motor, MODELS)}; known are {', '.join(MODELS)}"
             )
         is_gripper = gripper is not None and gripper.joint == joint.name
-        if is_gripper and current is not None and joint.motor not in CURRENT_UNIT_MA:
+        if is_gripper and current is not None and MODELS[joint.motor].current_unit is None:
+            known = [name for name, model in MODELS.items() if model.current_unit is not None]
             raise DescriptionError(
                 f"{path}: the chain's gripper has grip_current_ma, but {joint.motor}, the motor of {joint.name}, "
-                f"controls no current; leave it out, or use one of {', '.join(CURRENT_UNIT_MA)}"
+                f"controls no current; leave it out, or use one of {', '.join(known)}"
             )
 
 

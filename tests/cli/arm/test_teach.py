@@ -153,7 +153,7 @@ def test_an_arm_that_has_to_be_calibrated_is(desk):
 
 
 def test_a_servo_that_falls_silent_ends_it_and_loses_nothing(desk, monkeypatch):
-    monkeypatch.setattr("paramove.robots.dynamixel.arm.gravity_compensated_arm.GIVES_UP", 3)
+    monkeypatch.setattr("paramove.robots.dynamixel.bus.position_watch.GIVES_UP", 3)
     desk.calibrate()
 
     def unplug():

@@ -31,7 +31,6 @@ from .bus.servo_chain import ServoChain as ServoChain
 from .bus.servo_chain import ServoError as ServoError
 from .bus.servo_chain import ServoTimeoutError as ServoTimeoutError
 from .bus.servo_models import BAUD_RATES as BAUD_RATES
-from .bus.servo_models import CURRENT_UNIT_MA as CURRENT_UNIT_MA
 from .bus.servo_models import MODELS as MODELS
 from .bus.servo_models import XL330_M288 as XL330_M288
 from .bus.servo_models import XL430_W250 as XL430_W250

@@ -73,7 +73,7 @@ def test_another_model_is_told_and_never_written_to(arm):
     before = arm.memory("pan")
     with pytest.raises(CalibrationError, match="servo 1 is a xl430_w250, expected xl330_m288: nothing was written"):
         write_settings(arm.chain, pan)
-    with pytest.raises(CalibrationError, match="servo 1 is a xl430_w250, not a xl330_m288"):
+    with pytest.raises(CalibrationError, match="servo 1 is a xl430_w250, expected xl330_m288"):
         adopted(arm.chain, other)
     assert {name: value for name, value in arm.memory("pan").items() if name != "Realtime Tick"} == {
         name: value for name, value in before.items() if name != "Realtime Tick"

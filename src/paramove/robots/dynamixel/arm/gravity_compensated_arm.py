@@ -11,7 +11,7 @@ from paramove.documents import Floats, InputError
 from paramove.robots import RobotDescription
 from paramove.robots.dynamixel.arm.servo_arm import WATCHDOG_UNIT_S
 from paramove.robots.dynamixel.bus.position_watch import POSITION, PositionWatch
-from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError, ServoTimeoutError
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError
 from paramove.robots.dynamixel.bus.servo_models import CURRENT_MODE, PULSES_PER_TURN, model_named
 from paramove.robots.dynamixel.bus.servo_port import PortLostError
 
@@ -19,8 +19,6 @@ WATCHDOG_S = 0.2
 """A servo without data for so long switches its current off by itself."""
 CURRENT_FRACTION = 1.0 / 3.0
 """Of a servo's current limit: the maximum of a goal."""
-GIVES_UP = 25
-"""Readings in a row without a reply of a servo."""
 
 
 class TorqueOffArm:
@@ -41,7 +39,6 @@ class TorqueOffArm:
         self._units = description.units
         middle = 0.5 * (description.units.lower + description.units.upper)
         self._middle = self._units.zero_counts + self._units.counts_per_rad * middle
-        self._misses = 0
 
     def release(self) -> None:
         """Torque off; who holds the arm carries its weight from now on."""
@@ -65,11 +62,7 @@ class TorqueOffArm:
             ServoTimeoutError: A servo has not replied for long.
         """
         answers = self._watch.read(self._chain)
-        missing = [number for number in self._numbers if number not in answers]
-        self._misses = self._misses + 1 if missing else 0
-        if self._misses > GIVES_UP:
-            raise ServoTimeoutError(missing[0], f"servo {missing[0]} no longer answers: check its cable and its power")
-        if missing:
+        if self._watch.missing(answers):
             return None
         positions = np.array([answers[number].values[POSITION] for number in self._numbers], dtype=np.float64)
         # A servo in the extended mode may begin in another turn.

@@ -11,11 +11,10 @@ import numpy as np
 from paramove.robots.dynamixel.bus.clock import Clock
 from paramove.robots.dynamixel.bus.hardware_error import hardware_errors
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError
-from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, ServoModel
+from paramove.robots.dynamixel.bus.servo_models import CURRENT_BASED_MODE, POSITION_MODE, PULSES_PER_TURN, ServoModel
 from paramove.robots.dynamixel.calibration.arm_calibration import JointCalibration
 from paramove.safety import Fault
 
-POSITION_MODE, GRIP_MODE = 3, 5
 OLDEST_FIRMWARE = 42
 """Bus Watchdog (98) is known from this version on (e-Manual, "Bus Watchdog")."""
 VELOCITY_UNIT = 0.229 * 2.0 * math.pi / 60.0
@@ -52,18 +51,13 @@ class JointServo:
     def mode(self) -> int:
         """Operating Mode (11) that it must have."""
         if self.grip_current is not None:
-            return GRIP_MODE
+            return CURRENT_BASED_MODE
         return POSITION_MODE if self.calibration is None else self.calibration.operating_mode
 
     @property
     def profile_velocity(self) -> int:
         """Profile Velocity (112) that it must have; 0 for none."""
         return 0 if self.velocity is None else math.ceil(self.velocity / VELOCITY_UNIT)
-
-    @property
-    def homing_offset(self) -> int:
-        """Pulses that it must have."""
-        return 0 if self.calibration is None else self.calibration.homing_offset
 
     @property
     def position_limits(self) -> dict[str, int]:
@@ -166,7 +160,7 @@ def _faults_of_settings(servo: JointServo, chain: ServoChain) -> Iterable[Fault]
     expected = {
         "Operating Mode": servo.mode,
         "Drive Mode": 0,
-        "Homing Offset": servo.homing_offset,
+        "Homing Offset": 0,
         **servo.position_limits,
     }
     for name, value in expected.items():

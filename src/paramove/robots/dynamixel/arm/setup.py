@@ -18,7 +18,7 @@ from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
 from paramove.robots.dynamixel.bus.clock import PACING_SOCKET, Clock, EmulatorClock
 from paramove.robots.dynamixel.bus.serial_adapters import serial_of
-from paramove.robots.dynamixel.bus.servo_models import CURRENT_UNIT_MA, model_named
+from paramove.robots.dynamixel.bus.servo_models import ServoModel, model_named
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
 from paramove.safety import Fault
@@ -173,18 +173,19 @@ def joint_servos(description: RobotDescription, calibration: ArmCalibration | No
     """The servos of a described arm, in the order of its joint vector."""
     d = description
     calibrated = {} if calibration is None else calibration.joints
-    rows = zip(d.joint_names, d.servo_ids, d.motors, d.position_gains, d.velocity.tolist(), strict=True)
+    rows = zip(
+        d.joint_names, d.servo_ids, map(model_named, d.motors), d.position_gains, d.velocity.tolist(), strict=True
+    )
     return tuple(
-        JointServo(
-            name, number, model_named(motor), calibrated.get(name), _grip_current(d, name, motor), gains, velocity
-        )
-        for name, number, motor, gains, velocity in rows
+        JointServo(name, number, model, calibrated.get(name), _grip_current(d, name, model), gains, velocity)
+        for name, number, model, gains, velocity in rows
     )
 
 
-def _grip_current(description: RobotDescription, joint: str, motor: str) -> int | None:
+def _grip_current(description: RobotDescription, joint: str, model: ServoModel) -> int | None:
     """In the servo's units."""
     chain = description.chain
     if chain is None or joint != chain.gripper or chain.grip_current_ma is None:
         return None
-    return round(chain.grip_current_ma / CURRENT_UNIT_MA[motor])
+    assert model.current_unit is not None  # as the description was checked
+    return round(1e-3 * chain.grip_current_ma / model.current_unit)

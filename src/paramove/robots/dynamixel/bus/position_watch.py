@@ -7,11 +7,11 @@ distinguishes it from a true one, but the joint would have jumped.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Container, Mapping
 from dataclasses import dataclass
 
-from paramove.robots.dynamixel.bus.servo_chain import Answered, ServoChain
-from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, ServoModel
+from paramove.robots.dynamixel.bus.servo_chain import Answered, ServoChain, ServoTimeoutError
+from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, ServoModel, difference
 
 HAND_SPEED = 20.0
 """rad/s: no person turns a joint without torque faster, and no arm falls faster."""
@@ -21,6 +21,8 @@ AGREES_S = 0.02
 """Positions that must come twice are at most as far apart as a servo turns in this time,"""
 RECENT = 2
 """and in so many exchanges: behind a missing servo one replies in every second."""
+GIVES_UP = 25
+"""Readings in a row without a reply of a servo, half a second or so."""
 DEG_PER_PULSE = 360.0 / PULSES_PER_TURN
 POSITION = "Present Position"
 
@@ -60,6 +62,7 @@ class PositionWatch:
         self._accepted: dict[int, tuple[int, int]] = {}
         self._answered: dict[int, tuple[int, int, int]] = {}
         self._exchanges = 0
+        self._misses = 0
 
     def read(self, chain: ServoChain, held: Collection[int] = ()) -> dict[int, Answered]:
         """Positions, by ID, of the servos that reply with one that can be true; those of `held` have torque.
@@ -84,6 +87,14 @@ class PositionWatch:
                 if self.accepts(number, one.values[POSITION], times_ns, torque=number in held, complete=complete):
                     accepted[number] = one
         return accepted
+
+    def missing(self, answers: Container[int]) -> list[int]:
+        """Servos that did not answer. Raises ServoTimeoutError after too many such readings in a row."""
+        missing = [number for number in self._speeds if number not in answers]
+        self._misses = self._misses + 1 if missing else 0
+        if self._misses > GIVES_UP:
+            raise ServoTimeoutError(missing[0], f"servo {missing[0]} no longer answers: check its cable and its power")
+        return missing
 
     def accepts(
         self, number: int, position: int, times_ns: tuple[int, int], *, torque: bool, complete: bool = True
@@ -119,11 +130,6 @@ class PositionWatch:
             return False
         self._accepted[number] = (position, asked_ns)
         return True
-
-
-def difference(later: int, earlier: int) -> int:
-    """Counts from one position to another by the shorter way, -2048 to 2047."""
-    return (later - earlier + PULSES_PER_TURN // 2) % PULSES_PER_TURN - PULSES_PER_TURN // 2
 
 
 def _top_speed(model: ServoModel) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 from dynamixel_easy_sdk.control_table import ControlTable
 
@@ -18,8 +19,12 @@ PULSES_PER_TURN = 4096
 MAX_ID = 252
 BAUD_RATES = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
 """By the value of Baud Rate (8)."""
-CURRENT_MODE = 0
-"""A value of Operating Mode (11)."""
+CURRENT_MODE: Final = 0
+POSITION_MODE: Final = 3
+EXTENDED_MODE: Final = 4
+CURRENT_BASED_MODE: Final = 5
+"""Values of Operating Mode (11). All but the first have a goal position; that of `POSITION_MODE` is limited to one turn
+and the servo's own limits, `CURRENT_BASED_MODE` also limits the current."""
 SIGNED = frozenset(
     {
         "Homing Offset", "Goal PWM", "Goal Current", "Goal Velocity", "Goal Position", "Present PWM", "Present Current",
@@ -58,7 +63,8 @@ class ServoModel:
         voltage: Recommended, V.
         voltage_limits: Minimum and maximum that the factory allows, V.
         stall_torque: Held still with full power at the recommended voltage, N m; so many `stall_amperes` then flow.
-        current_unit: Amperes of one unit of current; None for a model that reports load in 0.1 % of the stall torque.
+        current_unit: Amperes of one unit of current (e-Manual, "Goal Current"); None for a model that has no current
+            mode and reports load in 0.1 % of the stall torque.
         baud_rates: That it supports, bit/s.
         registers: By name.
     """
@@ -99,5 +105,6 @@ def model_named(name: str) -> ServoModel:
     return MODELS[name]
 
 
-CURRENT_UNIT_MA = {"xm430_w350": 2.69, "xm430_w210": 2.69, "xl330_m288": 1.0, "xl330_m077": 1.0}
-"""mA of one unit of Goal Current (102) (e-Manual, "Goal Current"); XL430 has none."""
+def difference(later: int, earlier: int) -> int:
+    """Counts from one position to another by the shorter way, -2048 to 2047."""
+    return (later - earlier + PULSES_PER_TURN // 2) % PULSES_PER_TURN - PULSES_PER_TURN // 2

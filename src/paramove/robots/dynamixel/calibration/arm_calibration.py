@@ -23,12 +23,8 @@ from ruamel.yaml import YAML
 
 from paramove.documents import InputError, findings, read_document, replacing
 from paramove.robots import JointUnits
-from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_named
+from paramove.robots.dynamixel.bus.servo_models import POSITION_MODE, PULSES_PER_TURN, difference, model_named
 
-POSITION: Literal[3] = 3
-EXTENDED: Literal[4] = 4
-CURRENT_BASED: Literal[5] = 5
-"""Values of Operating Mode (11) with a goal position; the first is limited to one turn and the servo's own limits."""
 SEAM_MARGIN = 64
 """Counts that a travel must stay away from the encoder's seam, 5.6 degrees: joints sag, and stops give way."""
 LONGEST_TRAVEL = PULSES_PER_TURN - 2 * SEAM_MARGIN
@@ -68,7 +64,7 @@ class JointCalibration(_Part):
     def counts(self, position: int) -> int:
         """A Present Position as counts of this file, whichever turn the servo began in."""
         middle = (self.min_counts + self.max_counts) // 2
-        return middle + (position - middle + PULSES_PER_TURN // 2) % PULSES_PER_TURN - PULSES_PER_TURN // 2
+        return middle + difference(position, middle)
 
     def turns(self, position: int) -> int:
         """Whole turns by which a servo that presents this position is beyond the counts of this file.
@@ -219,8 +215,8 @@ def _contradiction(joint: JointCalibration) -> str:
         return f"expected min_counts below max_counts, found {joint.min_counts} and {joint.max_counts}"
     if travel > LONGEST_TRAVEL:
         return f"expected at most {LONGEST_TRAVEL} counts from min_counts to max_counts, found {travel}"
-    if joint.operating_mode == POSITION and joint.max_counts >= PULSES_PER_TURN:
-        return f"max_counts {joint.max_counts} is beyond the one turn of operating mode {POSITION}"
+    if joint.operating_mode == POSITION_MODE and joint.max_counts >= PULSES_PER_TURN:
+        return f"max_counts {joint.max_counts} is beyond the one turn of operating mode {POSITION_MODE}"
     if joint.operating_mode not in model_named(joint.model).modes:
         return f"{joint.model} has no operating mode {joint.operating_mode}"
     return ""

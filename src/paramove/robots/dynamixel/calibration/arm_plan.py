@@ -32,7 +32,6 @@ class PlannedServo:
     Attributes:
         joint: Name. number: ID. model: Name of its kind, as in `servo_models.MODELS`.
         lower, upper: Range of the joint, rad.
-        posture: Its angle in the posture in which the arm is held for calibration, rad.
         sign: 1 where the servo counts up with the angle in the arm as it is described, else -1.
         grows: Whether its direction is demonstrated with a growing angle; not where the posture has no room for it.
         direction: Where the joint moves then, in words.
@@ -44,7 +43,6 @@ class PlannedServo:
     model: str
     lower: float
     upper: float
-    posture: float = 0.0
     sign: int = 1
     grows: bool = True
     direction: str = ANGLE[0]

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from paramove.robots.dynamixel.bus.scan import model_name
-from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoTimeoutError
-from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, Register, model_named
-from paramove.robots.dynamixel.calibration.arm_calibration import (
-    CURRENT_BASED,
-    EXTENDED,
-    POSITION,
-    ArmCalibration,
-    CalibrationError,
-    JointCalibration,
+from paramove.robots.dynamixel.bus.servo_chain import PingedServo, ServoChain, ServoTimeoutError
+from paramove.robots.dynamixel.bus.servo_models import (
+    CURRENT_BASED_MODE,
+    EXTENDED_MODE,
+    POSITION_MODE,
+    PULSES_PER_TURN,
+    model_named,
 )
+from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration, CalibrationError, JointCalibration
 from paramove.robots.dynamixel.calibration.arm_plan import ArmPlan
 
 FILE, DESCRIPTION, SERVO = "file", "description", "servo"
@@ -50,12 +48,12 @@ class Difference:
 
 def settings(joint: JointCalibration) -> dict[str, int]:
     """Values of `SETTINGS` that its servo must have. In the other modes a servo ignores its limits."""
-    within_turn = joint.operating_mode == POSITION
+    within_turn = joint.operating_mode == POSITION_MODE
     return {
         "Return Delay Time": 0,
         "Drive Mode": 0,
         "Operating Mode": joint.operating_mode,
-        "Homing Offset": joint.homing_offset,
+        "Homing Offset": 0,
         "Max Position Limit": joint.max_counts if within_turn else PULSES_PER_TURN - 1,
         "Min Position Limit": joint.min_counts if within_turn else 0,
     }
@@ -63,7 +61,8 @@ def settings(joint: JointCalibration) -> dict[str, int]:
 
 def read_settings(chain: ServoChain, joint: JointCalibration) -> dict[str, int]:
     """As `settings`, but those that the servo has. Raises ServoError."""
-    return {register.name: chain.read(joint.id, register) for register in _registers(joint)}
+    registers = model_named(joint.model).registers
+    return {name: chain.read(joint.id, registers[name]) for name in SETTINGS}
 
 
 def write_settings(chain: ServoChain, joint: JointCalibration) -> dict[str, tuple[int, int]]:
@@ -76,13 +75,9 @@ def write_settings(chain: ServoChain, joint: JointCalibration) -> dict[str, tupl
         CalibrationError: The servo is of another model, its torque is on, or a value does not stay.
         ServoError: It does not reply, or rejects a value.
     """
-    pinged, model = chain.ping(joint.id), model_named(joint.model)
-    if pinged is None:
-        raise ServoTimeoutError(joint.id, f"servo {joint.id} does not answer; `paramove arm scan` looks for it")
-    if pinged.model_number != model.number:
-        found = model_name(pinged.model_number) or pinged.model_number
-        raise CalibrationError(f"servo {joint.id} is a {found}, expected {joint.model}: nothing was written to it")
-    if chain.read(joint.id, model.registers["Torque Enable"]):
+    _pinged(chain, joint)
+    registers = model_named(joint.model).registers
+    if chain.read(joint.id, registers["Torque Enable"]):
         raise CalibrationError(
             f"servo {joint.id} has torque, and its settings are locked: hold the arm and run `paramove arm reboot "
             f"{joint.id}`"
@@ -90,7 +85,7 @@ def write_settings(chain: ServoChain, joint: JointCalibration) -> dict[str, tupl
     before, expected = read_settings(chain, joint), settings(joint)
     changed = {name: (before[name], value) for name, value in expected.items() if before[name] != value}
     for name in changed:
-        chain.write(joint.id, model.registers[name], expected[name])
+        chain.write(joint.id, registers[name], expected[name])
     after = read_settings(chain, joint)
     for name, value in expected.items():
         if after[name] != value:
@@ -115,26 +110,18 @@ def adopted(chain: ServoChain, calibration: ArmCalibration) -> ArmCalibration:
     """
     joints = {}
     for name, joint in calibration.joints.items():
-        pinged = chain.ping(joint.id)
-        if pinged is None:
-            raise ServoTimeoutError(joint.id, f"joint {name}: servo {joint.id} does not answer")
-        if pinged.model_number != model_named(joint.model).number:
-            found = model_name(pinged.model_number) or pinged.model_number
-            raise CalibrationError(
-                f"joint {name}: servo {joint.id} is a {found}, not a {joint.model}: calibrate the arm"
-            )
-        read = read_settings(chain, joint)
+        pinged, read = _pinged(chain, joint), read_settings(chain, joint)
         if read["Homing Offset"] != 0:
             raise CalibrationError(
                 f"joint {name}: servo {joint.id} has Homing Offset {read['Homing Offset']}, and a calibration has "
                 "none: `paramove arm verify --write` sets it to 0"
             )
-        if read["Operating Mode"] not in (POSITION, EXTENDED, CURRENT_BASED):
+        if read["Operating Mode"] not in (POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE):
             raise CalibrationError(
                 f"joint {name}: servo {joint.id} has operating mode {read['Operating Mode']}, not 3 to 5"
             )
         values = {"firmware": pinged.firmware, "operating_mode": read["Operating Mode"]}
-        if read["Operating Mode"] == POSITION:
+        if read["Operating Mode"] == POSITION_MODE:
             values |= {"min_counts": read["Min Position Limit"], "max_counts": read["Max Position Limit"]}
         joints[name] = joint.model_copy(update=values)
     result = calibration.model_copy(update={"joints": joints})
@@ -142,8 +129,22 @@ def adopted(chain: ServoChain, calibration: ArmCalibration) -> ArmCalibration:
     return result
 
 
-def _registers(joint: JointCalibration) -> Sequence[Register]:
-    return [model_named(joint.model).registers[name] for name in SETTINGS]
+def _pinged(chain: ServoChain, joint: JointCalibration) -> PingedServo:
+    """The servo of a joint, as it answers. Raises ServoTimeoutError, and CalibrationError for one of another model."""
+    pinged = chain.ping(joint.id)
+    if pinged is None:
+        raise ServoTimeoutError(joint.id, f"servo {joint.id} does not answer; `paramove arm scan` looks for it")
+    if pinged.model_number != model_named(joint.model).number:
+        raise CalibrationError(
+            f"servo {joint.id} is a {_model(pinged)}, expected {joint.model}: nothing was written to it; connect the "
+            "right one, or calibrate the arm"
+        )
+    return pinged
+
+
+def _model(pinged: PingedServo) -> str | int:
+    """Name of its model, or the number of one without a name."""
+    return model_name(pinged.model_number) or pinged.model_number
 
 
 def _with_description(calibration: ArmCalibration, plan: ArmPlan) -> list[Difference]:
@@ -165,12 +166,9 @@ def _with_servo(chain: ServoChain, name: str, joint: JointCalibration) -> list[D
     pinged = chain.ping(joint.id)
     if pinged is None:
         return [Difference(name, "servo", f"ID {joint.id}", None, SERVO)]
-    model = model_named(joint.model)
-    if pinged.model_number != model.number:
-        found = model_name(pinged.model_number) or pinged.model_number
-        return [Difference(name, "model", joint.model, found, SERVO)]
-    pairs = [("firmware", joint.firmware, pinged.firmware)]
-
+    if pinged.model_number != model_named(joint.model).number:
+        return [Difference(name, "model", joint.model, _model(pinged), SERVO)]
     actual = read_settings(chain, joint)
-    pairs += [(register, value, actual[register]) for register, value in settings(joint).items()]
+    pairs = [(register, value, actual[register]) for register, value in settings(joint).items()]
+    pairs.insert(0, ("firmware", joint.firmware, pinged.firmware))
     return [Difference(name, what, one, other, SERVO) for what, one, other in pairs if one != other]
