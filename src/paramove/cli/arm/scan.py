@@ -10,7 +10,7 @@ import typer
 from paramove.cli.arm.options import ByIdOption, DataOption, SerialOption, configured_baud_rate, ended, open_arm
 from paramove.cli.bus_options import JsonOption, show
 from paramove.documents import exit_codes
-from paramove.robots.dynamixel import error_text, serial_adapters
+from paramove.robots.dynamixel import serial_adapters
 
 if TYPE_CHECKING:
     from paramove.robots.dynamixel import DetectedServo
@@ -72,6 +72,8 @@ def _tell(adapter: dict[str, Any], rates: str) -> None:
 
 
 def _row(servo: DetectedServo) -> dict[str, Any]:
+    from paramove.robots.dynamixel import error_text
+
     return {
         "id": servo.number,
         "model": servo.model,

@@ -11,8 +11,6 @@ from .bus.bench import bench_bus as bench_bus
 from .bus.bench import latency_timer_ms as latency_timer_ms
 from .bus.bench import slow_timer as slow_timer
 from .bus.clock import PACING_SOCKET as PACING_SOCKET
-from .bus.hardware_error import error_text as error_text
-from .bus.hardware_error import hardware_errors as hardware_errors
 from .bus.packets import Instruction as Instruction
 from .bus.packets import Packet as Packet
 from .bus.packets import encoded as encoded
@@ -38,6 +36,8 @@ from .bus.servo_port import PortLostError as PortLostError
 from .bus.servo_port import ServoPort as ServoPort
 from .bus.servo_reboot import ServoLoadedError as ServoLoadedError
 from .bus.servo_reboot import check_unloaded as check_unloaded
+from .bus.servo_reboot import error_text as error_text
+from .bus.servo_reboot import hardware_errors as hardware_errors
 from .bus.servo_reboot import reboot_messages as reboot_messages
 from .bus.servo_reboot import reboot_servo as reboot_servo
 from .bus.servo_reboot import servo_before_reboot as servo_before_reboot

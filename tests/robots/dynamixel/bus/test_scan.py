@@ -5,11 +5,11 @@ import pytest
 from dynamixel_emulator.emulator import DynamixelEmulator
 from dynamixel_emulator.servo import EmulatedServo
 from dynamixel_emulator.wire_faults import WireFaults
-from paramove.robots.dynamixel.bus.hardware_error import error_text
 from paramove.robots.dynamixel.bus.packets import Instruction, Packet, PacketReader
 from paramove.robots.dynamixel.bus.scan import USUAL_BAUD_RATES, BusScan, scan_bus
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
+from paramove.robots.dynamixel.bus.servo_reboot import error_text
 
 LATENCY_S = 0.1
 PAIRED = (("xl330_m288", 1), ("xl430_w250", 3), ("xl330_m288", 3))

@@ -99,12 +99,10 @@ def test_a_missing_servo_leaves_the_others_and_no_number_in_its_place(chain):
     assert chain.counts.missing == 3  # servo 3 waited for servo 7 at first
 
 
-def test_an_alert_comes_with_the_answer(chain, emulator):
+def test_a_servo_with_an_alert_answers(chain, emulator):
     with emulator.lock:
         emulator.bus.servos[1].memory["Hardware Error Status"] = 0x20
-    found = chain.sync_read([1, 2], POSITION)
-    assert not found[1].alert
-    assert found[2].alert
+    assert positions(chain, 1, 2) == {1: 1000, 2: 2000}
 
 
 def test_after_a_reboot_torque_is_off(chain, emulator):

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramove.robots.dynamixel.bus.clock import Clock
-from paramove.robots.dynamixel.bus.hardware_error import hardware_errors
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError
 from paramove.robots.dynamixel.bus.servo_models import CURRENT_BASED_MODE, POSITION_MODE, PULSES_PER_TURN, ServoModel
+from paramove.robots.dynamixel.bus.servo_reboot import hardware_errors
 from paramove.robots.dynamixel.calibration.arm_calibration import JointCalibration
 from paramove.safety import Fault
 

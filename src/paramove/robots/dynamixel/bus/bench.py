@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
-from paramove.robots.dynamixel.bus.servo_chain import ServoChain, WireCounts
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_models import XL430_W250
 from paramove.robots.dynamixel.bus.servo_port import BITS_PER_BYTE
 
@@ -50,14 +50,15 @@ class BusBench:
 def bench_bus(chain: ServoChain, numbers: Sequence[int], rounds: int) -> BusBench:
     """Read all of these servos so many times. Reads only. Raises PortLostError."""
     registers = [XL430_W250.registers[name] for name in STATE]
-    before = _counted(chain.counts)
+    before = asdict(chain.counts)
     times_ms = []
     for _ in range(rounds):
         began_ns = time.monotonic_ns()
         answers = chain.sync_read(numbers, registers)
         if len(answers) == len(numbers):
             times_ms.append(1e-6 * (time.monotonic_ns() - began_ns))
-    errors = {name: count - before[name] for name, count in _counted(chain.counts).items()}
+    after = asdict(chain.counts)
+    errors = {kind: after[kind] - before[kind] for kind in ("missing", "damaged", "stray", "echoed")}
     p50, p99, longest = np.percentile(times_ms, [50, 99, 100]) if times_ms else [np.nan] * 3
     write_ms = 1e3 * (WRITE_BYTES + GOAL_BYTES * len(numbers)) * BITS_PER_BYTE / chain.port.baud_rate
     rates = held_rates(p99 + write_ms) if len(times_ms) == rounds else held_rates(np.nan)
@@ -89,12 +90,3 @@ def slow_timer(device: str, timer_ms: int) -> str:
         'good: ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1" in '
         "/etc/udev/rules.d/99-latency.rules"
     )
-
-
-def _counted(counts: WireCounts) -> dict[str, int]:
-    return {
-        "missing": counts.missing,
-        "damaged": counts.damaged,
-        "stray": counts.stray,
-        "echoed": counts.echoed,
-    }

@@ -93,9 +93,9 @@ def _checksums() -> tuple[int, ...]:
 _CHECKSUMS = _checksums()
 
 
-def checksum(data: bytes, before: int = 0) -> int:
-    """CRC-16 with polynomial 0x8005, most significant bit first, from 0 or from the checksum of what came before."""
-    value = before
+def checksum(data: bytes) -> int:
+    """CRC-16 with polynomial 0x8005, most significant bit first, from 0."""
+    value = 0
     for byte in data:
         value = (value << 8) & 0xFFFF ^ _CHECKSUMS[value >> 8 ^ byte]
     return value
@@ -119,15 +119,6 @@ class PacketReader:
 
     def __init__(self) -> None:
         self._bytes = bytearray()
-
-    @property
-    def waits(self) -> bool:
-        """Whether the last bytes may be the beginning of a packet."""
-        return bool(self._bytes)
-
-    def forget(self) -> None:
-        """Drop the beginning of a packet whose rest did not come in time."""
-        self._bytes.clear()
 
     def feed(self, data: bytes) -> Iterator[Packet | DamagedPacket]:
         """The packets that these bytes complete."""

@@ -85,12 +85,10 @@ class Answered:
 
     Attributes:
         values: Numbers.
-        alert: Whether the servo has a hardware error (register 70).
         asked_ns, at_ns: When it was asked, and when the reply was complete, by the port's clock.
     """
 
     values: dict[str, int]
-    alert: bool
     asked_ns: int
     at_ns: int
 
@@ -143,8 +141,9 @@ class ServoChain:
 
     def ping(self, number: int, retry: bool = True) -> PingedServo | None:
         """Ask one servo whether it is there; `retry`: with the attempts of a read, else once."""
-        packet = [0, 0, 0, 0, number, 3, 0, Instruction.PING, 0, 0]
-        answer = self._insist(packet, number, PING_DATA, ATTEMPTS_S if retry else ATTEMPTS_S[:1])
+        answer = self._insist(
+            _packet(number, Instruction.PING), number, PING_DATA, ATTEMPTS_S if retry else ATTEMPTS_S[:1]
+        )
         return None if answer is None else _pinged(answer)
 
     def ping_all(self) -> list[PingedServo]:
@@ -152,8 +151,7 @@ class ServoChain:
 
         Two servos of one ID reply at the same time: `counts.noise` grows. If both are understood, both are listed.
         """
-        packet = [0, 0, 0, 0, BROADCAST, 3, 0, Instruction.PING, 0, 0]
-        self._send(lambda: self._sdk.txPacket(self.port, packet))
+        self._send(lambda: self._sdk.txPacket(self.port, _packet(BROADCAST, Instruction.PING)))
         wire_s = (PACKET_BYTES + PING_DATA) * BITS_PER_BYTE / self.port.baud_rate
         self.port.setPacketTimeoutMillis(1e3 * (BROADCAST * (wire_s + TURN_S) + self.port.latency_s))
         servos = [_pinged(one) for one in self._replies({}) if len(one.parameters) == 1 + PING_DATA]
@@ -170,7 +168,8 @@ class ServoChain:
 
     def write(self, number: int, register: Register, value: int) -> None:
         """Write one number of one servo. Raises ServoError."""
-        packet = _write_packet(number, register.address, list(_bytes(register, value)))
+        parameters = [*register.address.to_bytes(2, "little"), *_bytes(register, value)]
+        packet = _packet(number, Instruction.WRITE, parameters)
         answer = self._insist(packet, number, 0, ATTEMPTS_S)
         if answer is None:
             raise _no_reply(number, f"write {register.name}")
@@ -178,7 +177,7 @@ class ServoChain:
 
     def reboot(self, number: int) -> None:
         """Switch a servo off and on: torque off, errors cleared. Raises ServoError."""
-        packet = [0, 0, 0, 0, number, 3, 0, Instruction.REBOOT, 0, 0]
+        packet = _packet(number, Instruction.REBOOT)
         if number not in self._exchange(lambda: self._sdk.txPacket(self.port, packet), {number: 0}):
             raise _no_reply(number, "reboot")
 
@@ -205,8 +204,8 @@ class ServoChain:
         size = max(one.address + one.size for one in registers) - address
         answers, asked_ns = {}, self.port.clock.now_ns
         for number, packet in self._read(numbers, address, size).items():
-            if (error := packet.parameters[0]) in (0, ALERT):
-                answers[number] = Answered(_values(registers, packet), error == ALERT, asked_ns, self.port.clock.now_ns)
+            if packet.parameters[0] in (0, ALERT):
+                answers[number] = Answered(_values(registers, packet), asked_ns, self.port.clock.now_ns)
         return answers
 
     def sync_write(self, register: Register, values: dict[int, int]) -> None:
@@ -220,7 +219,7 @@ class ServoChain:
         wide = self._delayed.length_for(size)
         if len(numbers) == 1:
             parameters = [*address.to_bytes(2, "little"), *wide.to_bytes(2, "little")]
-            packet = [0, 0, 0, 0, numbers[0], 7, 0, Instruction.READ, *parameters, 0, 0]
+            packet = _packet(numbers[0], Instruction.READ, parameters)
             return self._exchange(lambda: self._sdk.txPacket(self.port, packet), {numbers[0]: wide}, timeout_s)
         sizes = dict.fromkeys(numbers, wide)
         return self._exchange(
@@ -360,9 +359,10 @@ def _bytes(register: Register, value: int) -> bytes:
     return value.to_bytes(register.size, "little", signed=register.signed)
 
 
-def _write_packet(number: int, address: int, data: list[int]) -> list[int]:
-    length = len(data) + 5
-    return [0, 0, 0, 0, number, length & 255, length >> 8, Instruction.WRITE, address & 255, address >> 8, *data, 0, 0]
+def _packet(number: int, instruction: Instruction, parameters: Sequence[int] = ()) -> list[int]:
+    """As the SDK sends it: header and checksum are 0 until then."""
+    length = len(parameters) + 3
+    return [0, 0, 0, 0, number, length & 255, length >> 8, instruction, *parameters, 0, 0]
 
 
 class DelayedReplies:

@@ -1,11 +1,14 @@
-"""Reboots one servo, which clears its hardware error, and leaves the others as they are."""
+"""Hardware errors in words, with what helps, and the reboot of one servo, which clears them.
+
+Of Hardware Error Status (70) (ROBOTIS e-Manual, "Hardware Error Status"). A reboot leaves the other servos as they are.
+"""
 
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 
 from paramove.documents import InputError
-from paramove.robots.dynamixel.bus.hardware_error import hardware_errors
 from paramove.robots.dynamixel.bus.scan import DetectedServo, looked_at
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoTimeoutError
 
@@ -16,8 +19,44 @@ FULL_LOAD = 1000
 """Present Load (126) in units of 0.1 %."""
 
 
+@dataclass(frozen=True)
+class HardwareError:
+    """One bit of the register.
+
+    Attributes:
+        words: What happened.
+        remedy: What to do before the servo is rebooted.
+    """
+
+    words: str
+    remedy: str
+
+
+HARDWARE_ERRORS = {
+    0: HardwareError("input voltage out of its limits", "check the power supply and the cables' plugs"),
+    1: HardwareError("hall sensor of the motor failed", "the servo must be repaired"),
+    2: HardwareError("overheated", "let it cool, and give it less to carry or more pauses"),
+    3: HardwareError("motor encoder failed", "the servo must be repaired"),
+    4: HardwareError("electrical shock, or too little power to the motor", "check the power supply; then the servo"),
+    5: HardwareError("overloaded", "take the load off; look for what blocked the joint"),
+}
+"""By the number of the bit; bit 1 of the P series only."""
+
+
 class ServoLoadedError(InputError):
     """The servo holds its joint, which would fall when it reboots."""
+
+
+def hardware_errors(status: int) -> tuple[HardwareError, ...]:
+    """What the bits of the register stand for; unknown bits are named by their number."""
+    bits = [bit for bit in range(8) if status >> bit & 1]
+    unknown = "look for it in the servo's e-Manual"
+    return tuple(HARDWARE_ERRORS.get(bit, HardwareError(f"unknown error, bit {bit}", unknown)) for bit in bits)
+
+
+def error_text(status: int) -> str:
+    """One line, "" without an error."""
+    return ", ".join(one.words for one in hardware_errors(status))
 
 
 def servo_before_reboot(chain: ServoChain, number: int) -> DetectedServo:
