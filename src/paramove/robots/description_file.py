@@ -230,20 +230,21 @@ def _check(path: Path, file: RobotFile) -> None:
                 f"{joint.lower_deg} to {joint.upper_deg} deg"
             )
     for side, arm in file.arms.items():
-        _check_arm(path, names, side, arm)
+        _check_hand(path, f"arm {side!r}", names, arm.joints, arm.fingers)
     _check_servos(path, file)
     if file.chain is not None:
-        _check_chain(path, file.joints, file.chain)
+        _check_hand(path, "the chain", names, file.chain.joints, file.chain.gripper)
+        _check_gripper(path, file.joints[names.index(file.chain.gripper.joint)], file.chain.gripper)
     if not (path.parent / file.model).is_file():
         raise DescriptionError(f"{path}: the model file {path.parent / file.model} does not exist", missing=True)
 
 
-def _check_arm(path: Path, names: list[str], side: str, arm: ArmPart) -> None:
-    if arm.fingers.open_deg == arm.fingers.closed_deg:
-        raise DescriptionError(f"{path}: arm {side!r}: expected different angles of the open and the closed hand")
-    unknown = [name for name in (*arm.joints, arm.fingers.joint) if name not in names]
+def _check_hand(path: Path, what: str, names: list[str], joints: tuple[str, ...], hand: FingersPart) -> None:
+    unknown = [name for name in (*joints, hand.joint) if name not in names]
     if unknown:
-        raise DescriptionError(f"{path}: arm {side!r} names unknown joints: {', '.join(unknown)}")
+        raise DescriptionError(f"{path}: {what} names unknown joints: {', '.join(unknown)}")
+    if hand.open_deg == hand.closed_deg:
+        raise DescriptionError(f"{path}: {what}: expected different angles of the open and the closed {hand.joint}")
 
 
 def _check_servos(path: Path, file: RobotFile) -> None:
@@ -288,15 +289,7 @@ def _check_models(path: Path, file: RobotFile) -> None:
             )
 
 
-def _check_chain(path: Path, joints: tuple[JointPart, ...], chain: ChainPart) -> None:
-    parts = {joint.name: joint for joint in joints}
-    gripper = chain.gripper
-    unknown = [name for name in (*chain.joints, gripper.joint) if name not in parts]
-    if unknown:
-        raise DescriptionError(f"{path}: the chain names unknown joints: {', '.join(unknown)}")
-    if gripper.open_deg == gripper.closed_deg:
-        raise DescriptionError(f"{path}: the chain: expected different angles of the open and the closed gripper")
-    joint = parts[gripper.joint]
+def _check_gripper(path: Path, joint: JointPart, gripper: GripperPart) -> None:
     for angle in (gripper.open_deg, gripper.closed_deg):
         if not joint.lower_deg <= angle <= joint.upper_deg:
             raise DescriptionError(

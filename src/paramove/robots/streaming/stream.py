@@ -19,6 +19,7 @@ from paramove.documents import Floats, Ints
 from paramove.robots import RobotDescription
 
 Frames = NDArray[np.int16]
+"""Joint units of a robot, [J], or [N, J] of N frames."""
 
 MAX_FRAMES = 5000
 # Accelerations are judged over spans of this length, at least one frame: over 1 ms, rounding to counts is larger than

@@ -461,7 +461,7 @@ def test_the_emergency_stop_wins_over_the_way_to_rest(emulator, tmp_path, caplog
     with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), settings) as arm:
         person = PersonAtEmulator(arm, emulator)
         person.arms_and_waits()
-        measured = arm._loop._arm.measured
+        measured = arm._loop.arm.measured
 
         def measured_until_it_moves():
             reading = measured()
@@ -469,7 +469,7 @@ def test_the_emergency_stop_wins_over_the_way_to_rest(emulator, tmp_path, caplog
                 button.touch()
             return reading
 
-        arm._loop._arm.measured = measured_until_it_moves
+        arm._loop.arm.measured = measured_until_it_moves
     assert person.memory("Torque Enable") == [1] * 5
     reached = ROBOT.units.to_radians(np.array(person.goals()))[0] - ROBOT.base_pose[0]
     assert 0.1 <= reached < 0.5

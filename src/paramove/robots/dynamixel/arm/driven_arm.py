@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator
-from types import TracebackType
 from typing import Any, Self
 
 import mujoco
@@ -58,9 +57,9 @@ class DrivenArm:
             emergency_timeout_ms=EMERGENCY_MS if settings.stop_inputs.are_there else None,
         )
         self._caution, self._clock = settings.caution, port.clock
-        self._driver = ArmDriver(
-            description, safety, self_collision(description), settings.why_no_program, settings.link_timeout_s
-        )
+        d, model = description, mujoco.MjModel.from_xml_path(str(description.model_path))
+        clearance = SelfCollision(model, d.joint_names, d.base_pose, d.soft_lower, d.soft_upper)
+        self._driver = ArmDriver(d, safety, clearance, settings.why_no_program, settings.link_timeout_s)
         self.readable, self._written = os.pipe2(os.O_NONBLOCK)
         self._loop = ServoLoop(self._driver, description, servos, port, settings, self._wake)
         self._slow_ns = self._safety_ns = self._motors_ns = 0
@@ -70,10 +69,8 @@ class DrivenArm:
         self._loop.__enter__()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
-    ) -> None:
-        self._loop.__exit__(kind, error, where)
+    def __exit__(self, *raised: Any) -> None:
+        self._loop.__exit__(*raised)
 
     @property
     def detail(self) -> str:
@@ -147,13 +144,6 @@ class DrivenArm:
     def _wake(self) -> None:
         with contextlib.suppress(BlockingIOError):  # a full pipe is readable already
             os.write(self._written, b".")
-
-
-def self_collision(description: RobotDescription) -> SelfCollision:
-    """Distances between the parts of a described robot, as its model has them."""
-    model = mujoco.MjModel.from_xml_path(str(description.model_path))
-    d = description
-    return SelfCollision(model, d.joint_names, d.base_pose, d.soft_lower, d.soft_upper)
 
 
 def motor_status(arm: ServoArm, now_ns: int) -> MotorStatus:

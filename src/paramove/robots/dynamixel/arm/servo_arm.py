@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.documents import Floats, InputError
 from paramove.robots import INT16_RANGE
@@ -23,9 +22,8 @@ from paramove.robots.dynamixel.bus.position_watch import POSITION, PositionWatch
 from paramove.robots.dynamixel.bus.servo_chain import Answered, ServoChain, ServoError
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN
 from paramove.robots.dynamixel.bus.servo_port import PortLostError
+from paramove.robots.streaming import Frames
 from paramove.safety import Fault
-
-Counts = NDArray[np.int16]
 
 GAINS = ("Position P Gain", "Position I Gain", "Position D Gain")
 WATCHDOG_UNIT_S, WATCHDOG_TRIPPED = 0.020, 0xFF
@@ -67,7 +65,7 @@ class ArmReading:
     """
 
     at_ns: int
-    counts: Counts
+    counts: Frames
     ages_s: Floats
 
 
@@ -192,7 +190,7 @@ class ServoArm:
                     failed.append(f"{servo.joint}: {error}")
         return tuple(failed)
 
-    def command(self, counts: Counts) -> None:
+    def command(self, counts: Frames) -> None:
         """Goal positions of all joints, [J] pulses within their ranges, in one packet."""
         pairs = zip(self._numbers, counts, self._turns, strict=True)
         goals = {number: int(count) + PULSES_PER_TURN * turns for number, count, turns in pairs}
@@ -269,7 +267,10 @@ class ServoArm:
         fault = None
         for servo, health, (torque, error) in self._read_each("Torque Enable", "Hardware Error Status"):
             health.torque, health.hardware_error = bool(torque), error
-            fault = fault or self._fault_of_health(servo, health)
+            if error:
+                fault = fault or hardware_fault(servo, error)
+            elif self.holds and not torque:
+                fault = fault or torque_fault(servo)
         return fault
 
     def look_after_supply(self) -> Fault | None:
@@ -286,18 +287,17 @@ class ServoArm:
         return watchdog_fault(tripped[0], self._timeouts.watchdog_s) if tripped else None
 
     def _read_each(self, *names: str) -> Iterator[tuple[JointServo, ServoHealth, list[int]]]:
-        """Of each servo that replies, its health so far and these registers."""
-        answers = self._read(*names)
+        """Of each servo that replies, its health so far and these registers.
+
+        The loop does not wait for an arm that is not responding; it still sends goals.
+        """
+        if not self._chain.has_room():
+            return
+        answers = self._chain.sync_read(self._numbers, [self._registers[name] for name in names])
         for servo in self.servos:
             if servo.number in answers:
                 values = answers[servo.number].values
                 yield servo, self.health[servo.joint], [values[name] for name in names]
-
-    def _read(self, *names: str) -> dict[int, Answered]:
-        """Of the servos that reply. The loop does not wait for an arm that is not responding; it still sends goals."""
-        if not self._chain.has_room():
-            return {}
-        return self._chain.sync_read(self._numbers, [self._registers[name] for name in names])
 
     def not_responding(self) -> str:
         """Message about the servos that have never replied; "" if all have."""
@@ -320,10 +320,3 @@ class ServoArm:
                     f"{servo.joint} has {voltage:.1f} V, its limit is {low:.1f} V: charge or check the supply"
                 )
         return tuple(messages)
-
-    def _fault_of_health(self, servo: JointServo, health: ServoHealth) -> Fault | None:
-        if health.hardware_error:
-            return hardware_fault(servo, health.hardware_error)
-        if self.holds and not health.torque:
-            return torque_fault(servo)
-        return None

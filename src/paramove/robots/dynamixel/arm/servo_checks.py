@@ -20,7 +20,6 @@ OLDEST_FIRMWARE = 42
 VELOCITY_UNIT = 0.229 * 2.0 * math.pi / 60.0
 """rad/s of one unit, 0.229 rev/min (e-Manual, "Profile Velocity")."""
 ROUND_TRIPS = 20
-ENDS = ("Min", "Max")
 ENDED = "once this driver has ended,"
 """One program uses the adapter at a time."""
 
@@ -178,7 +177,7 @@ def _faults_of_state(servo: JointServo, chain: ServoChain) -> Iterable[Fault]:
 
     if error := read("Hardware Error Status"):
         yield hardware_fault(servo, error)
-    low, high = (0.1 * read(f"{end} Voltage Limit") for end in ENDS)
+    low, high = 0.1 * read("Min Voltage Limit"), 0.1 * read("Max Voltage Limit")
     if fault := voltage_fault(servo, 0.1 * read("Present Input Voltage"), low, high):
         yield fault
     temperature, limit = read("Present Temperature"), read("Temperature Limit")

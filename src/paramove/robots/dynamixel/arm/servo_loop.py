@@ -11,7 +11,6 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -19,13 +18,13 @@ import numpy as np
 from paramove.documents import Floats, InputError
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.robots import RESTARTED, RobotDescription, ThisLaunch
-from paramove.robots.dynamixel.arm.servo_arm import ArmReading, Counts, ServoArm, Timeouts
+from paramove.robots.dynamixel.arm.servo_arm import ArmReading, ServoArm, Timeouts
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
 from paramove.robots.dynamixel.bus.clock import ClockLostError, EmulatorClock
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_port import PortLostError, ServoPort
-from paramove.robots.streaming import ArmDriver, DriverOutput, StreamReader
+from paramove.robots.streaming import ArmDriver, DriverOutput, Frames, StreamReader
 from paramove.safety import Fault, State
 
 EXIT_SPEED_FRACTION = 0.5
@@ -125,7 +124,8 @@ class ServoLoop:
         self._servos = servos
         self._settings = settings
         self._on_output = on_output
-        self._arm = ServoArm(servos, ServoChain(port), self._period_s, settings.timeouts)
+        self.arm = ServoArm(servos, ServoChain(port), self._period_s, settings.timeouts)
+        """The servos; others after the port was lost and opened again."""
         self._reader: StreamReader | None = None
         self._output: deque[DriverOutput] = deque()  # needs no lock: a check of a trajectory would hold it for long
         self._step = 0
@@ -142,20 +142,13 @@ class ServoLoop:
     def _now_s(self) -> float:
         return 1e-9 * self._clock.now_ns
 
-    @property
-    def arm(self) -> ServoArm:
-        """The servos."""
-        return self._arm
-
     def __enter__(self) -> Self:
         self._open()
         if not self._paced:
             self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._normal_end = kind is None
         self._stopped.set()
         if isinstance(self._clock, EmulatorClock):
@@ -234,12 +227,12 @@ class ServoLoop:
 
     def _move_and_read(self) -> None:
         reader = self._reader
-        if reader is not None and self._arm.holds:
-            self._arm.command(reader.play())
-        reading = self._arm.measured()
+        if reader is not None and self.arm.holds:
+            self.arm.command(reader.play())
+        reading = self.arm.measured()
         if reading is None:
             return
-        if reader is None or not self._arm.holds:
+        if reader is None or not self.arm.holds:
             reader = self._reader = StreamReader(self._description, reading.counts)
         fault = self._fault(reading)
         if fault is not None and self.driver.state in MOVING:  # else the checks before arming detect it
@@ -248,25 +241,25 @@ class ServoLoop:
             reading = self._prepare() or reading  # the checks took longer than a reading counts
             self._urgent = True
             reader = self._reader = StreamReader(self._description, reading.counts)
-        elif self._arm.holds and self.driver.state not in HOLDING and reader.at_rest:
+        elif self.arm.holds and self.driver.state not in HOLDING and reader.at_rest:
             self._let_go(self._settings.torque_off)  # not before the stop ramp is over
         self.driver.on_robot_state(reader.state(reading.counts, reading.at_ns), reading.at_ns)
 
     def _prepare(self) -> ArmReading | None:
         """Check the servos and let them hold their positions, before the gate gets the arming request."""
         began_ns = self._clock.now_ns
-        faults = self._settings.standing_faults or self._arm.check() or self._arm.take_hold()
+        faults = self._settings.standing_faults or self.arm.check() or self.arm.take_hold()
         self.driver.on_arming_checks(faults, began_ns)
-        return self._arm.measured()
+        return self.arm.measured()
 
     def _fault(self, reading: ArmReading) -> Fault | None:
-        fault = self._arm.fault_of_answers(reading)
-        if self._arm.holds and self._pause_s > WATCHDOG_FRACTION * self._settings.timeouts.watchdog_s:
-            fault = self._arm.look_after_watchdogs() or fault
+        fault = self.arm.fault_of_answers(reading)
+        if self.arm.holds and self._pause_s > WATCHDOG_FRACTION * self._settings.timeouts.watchdog_s:
+            fault = self.arm.look_after_watchdogs() or fault
         if self._step % HEALTH_STEPS == 0:
-            fault = self._arm.look_after() or fault
+            fault = self.arm.look_after() or fault
         elif self._step % SUPPLY_STEPS == HEALTH_STEPS // 2:
-            fault = self._arm.look_after_supply() or fault
+            fault = self.arm.look_after_supply() or fault
         return fault
 
     def _report(self, fault: Fault) -> None:
@@ -299,10 +292,10 @@ class ServoLoop:
             self._reopen_s = self._now_s + REOPEN_S
             return
         self.lost = ""
-        self._arm = ServoArm(self._servos, ServoChain(self._port), self._period_s, self._settings.timeouts)
+        self.arm = ServoArm(self._servos, ServoChain(self._port), self._period_s, self._settings.timeouts)
 
     def _let_go(self, torque_off: bool) -> None:
-        for failed in self._arm.let_go(torque_off):
+        for failed in self.arm.let_go(torque_off):
             _log.warning("a servo did not take its final settings: %s", failed)
 
     def _goes_to(self, rest: Mapping[str, float]) -> bool:
@@ -324,7 +317,10 @@ class ServoLoop:
             elif self._now_s > ends_s:
                 reason = "it took too long"
                 break
-            self._stopped_period()
+            begun_ns = self._clock.now_ns
+            with self.lock:
+                self._one_period()
+            self._clock.wait_until(begun_ns + self._period_ns)
             statuses = [one for output in self.take() for one in output.statuses if one.trajectory_id == name]
             if statuses and statuses[-1].state == TrajectoryStatus.STATE_SUCCEEDED:
                 return True
@@ -336,23 +332,16 @@ class ServoLoop:
         _log.warning("the arm holds its position and does not go to rest: %s", self.lost or reason)
         return False
 
-    def _stopped_period(self) -> None:
-        """One more period of a loop that is ending."""
-        begun_ns = self._clock.now_ns
-        with self.lock:
-            self._one_period()
-        self._clock.wait_until(begun_ns + self._period_ns)
-
     def _end(self, rests: bool) -> None:
         """Come to rest by the rows of the reader, wait for the servos, then write their final settings."""
-        measured: deque[Counts] = deque(maxlen=1 + round(SETTLED_S / self._period_s))
+        measured: deque[Frames] = deque(maxlen=1 + round(SETTLED_S / self._period_s))
         stands_s = None
         try:
-            while self._arm.holds and self._reader is not None:
-                self._arm.command(self._reader.play())
+            while self.arm.holds and self._reader is not None:
+                self.arm.command(self._reader.play())
                 if self._reader.at_rest:
                     stands_s = stands_s or self._now_s
-                    reading = self._arm.measured()
+                    reading = self.arm.measured()
                     if reading is not None:
                         measured.append(reading.counts)
                     settled = len(measured) == measured.maxlen and np.ptp(measured, axis=0).max() <= 1

@@ -104,22 +104,18 @@ class ServoArmSetup(OldNames):
             calibration = ArmCalibration.load(self.calibration, serial_of(self.port.name))
             description = calibrated(description, calibration)
         is_even = emulated is not None and emulated.nominal
-        faults = () if is_even or calibration is not None else uncalibrated(description)
-        servos = joint_servos(description, calibration)
-        stop_inputs = StopInputs(self.stop_file, self.stop_line, self.stop_line_pressed)
+        is_refused = self.emulated is not None and emulated is None
         settings = LoopSettings(
             self.torque_off,
             timeouts,
-            faults,
-            stop_inputs,
+            () if is_even or calibration is not None else uncalibrated(description),
+            StopInputs(self.stop_file, self.stop_line, self.stop_line_pressed),
             self._rest(description),
+            emulated_by=None if emulated is None else launch,
+            caution=f"{port.name} counts as a real arm, which a person arms: {reason}" if is_refused else "",
             link_timeout_s=self.link_timeout_s,
         )
-        if emulated is not None:
-            settings = replace(settings, emulated_by=launch)
-        elif self.emulated is not None:
-            settings = replace(settings, caution=f"{port.name} counts as a real arm, which a person arms: {reason}")
-        return DrivenArm(description, servos, port, settings)
+        return DrivenArm(description, joint_servos(description, calibration), port, settings)
 
     def _rest(self, description: RobotDescription) -> dict[str, float] | None:
         """Angles at which the arm goes limp, rad; None: it does not. Raises InputError."""
