@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from paramove.documents import Floats
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, SafetyFault, SafetyState, StopRequest
 from paramove.robots import RobotDescription
@@ -101,7 +100,10 @@ class ArmDriver:
         self._clearance = clearance
         self._limits = description.motion_limits
         self._ahead_rows = int(np.ceil(longest_path_s(self._limits) / self._limits.dt_s))
-        self._start_tolerance = _start_tolerance(description)
+        # Fingers that hold something are measured far from where they are commanded, and only this driver knows the
+        # command. The movement from there to the trajectory is judged like the rest of it.
+        self._start_tolerance = np.full(description.n_joints, np.deg2rad(description.stream.start_tolerance_deg))
+        self._start_tolerance[list(description.gripper_indices)] = np.inf
         self._begin_at(0)
         self._report: RobotReport | None = None
         self._reported = False
@@ -381,14 +383,3 @@ class ArmDriver:
             SafetyFault(code=fault.code, joint=fault.joint, detail=fault.detail) for fault in self._core.faults
         )
         return message
-
-
-def _start_tolerance(description: RobotDescription) -> Floats:
-    """How far a trajectory may begin from the commanded pose, [J], rad.
-
-    Fingers that hold something are measured far from where they are commanded, and only this driver knows the
-    command. The movement from there to the trajectory is judged like the rest of it.
-    """
-    tolerance = np.full(description.n_joints, np.deg2rad(description.stream.start_tolerance_deg))
-    tolerance[list(description.gripper_indices)] = np.inf
-    return tolerance

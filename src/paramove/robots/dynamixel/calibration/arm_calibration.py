@@ -162,7 +162,7 @@ class ArmCalibration(_Part):
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
             file.write(HEADER)
-            _writer().dump(content, file)
+            YAML().dump(content, file)
 
     def units(self, joint_names: Sequence[str], lower: ArrayLike, upper: ArrayLike) -> JointUnits:
         """Units of these joints, each within its described range and the demonstrated travel, whichever is less.
@@ -220,9 +220,3 @@ def _contradiction(joint: JointCalibration) -> str:
     if joint.operating_mode not in model_named(joint.model).modes:
         return f"{joint.model} has no operating mode {joint.operating_mode}"
     return ""
-
-
-def _writer() -> YAML:
-    yaml = YAML()
-    yaml.default_flow_style = False
-    return yaml
