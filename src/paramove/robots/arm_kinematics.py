@@ -25,6 +25,7 @@ class ArmPoints:
 
     elbow: Floats
     gripper: Floats
+    fingertip: Floats
     shoulder_from_hand: Floats
 
 
@@ -35,10 +36,12 @@ class ArmKinematics:
     Attributes:
         upper_arm: Shoulder to elbow, m.
         gripper_from_elbow: Centre of a held 20 mm cylinder, from the elbow, zero pose, [3], m.
+        fingertip_from_elbow: Fingertip, likewise.
     """
 
     upper_arm: float
     gripper_from_elbow: tuple[float, float, float]
+    fingertip_from_elbow: tuple[float, float, float]
 
     def forward(self, angles: ArrayLike) -> ArmPoints:
         """Where the arm's points are.
@@ -58,6 +61,7 @@ class ArmKinematics:
         return ArmPoints(
             elbow=elbow,
             gripper=elbow + shoulder_from_hand @ np.asarray(self.gripper_from_elbow),
+            fingertip=elbow + shoulder_from_hand @ np.asarray(self.fingertip_from_elbow),
             shoulder_from_hand=shoulder_from_hand,
         )
 

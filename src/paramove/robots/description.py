@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Annotated
 
@@ -166,20 +165,15 @@ class RobotDescription:
             dt_s=self.stream.period_us * 1e-6,
         )
 
-    @cached_property
-    def _index_of(self) -> dict[str, int]:
-        return {name: index for index, name in enumerate(self.joint_names)}
-
     def index(self, joint: str) -> int:
         """Index of a joint in the joint vector.
 
         Raises:
             DescriptionError: No such joint; names the nearest one.
         """
-        index = self._index_of.get(joint)
-        if index is None:
+        if joint not in self.joint_names:
             raise DescriptionError(f"{self.name} has no joint {joint!r}; {nearest(joint, self.joint_names)}")
-        return index
+        return self.joint_names.index(joint)
 
     def indices(self, joints: Iterable[str]) -> NDArray[np.intp]:
         """Indices of several joints, ready to index a joint vector."""
@@ -291,16 +285,14 @@ def _arm(names: tuple[str, ...], arm: ArmPart) -> Arm:
         felt_opening=arm.fingers.felt_opening,
         holding_openings=arm.fingers.holding_openings,
         sites=arm.sites,
-        kinematics=ArmKinematics(arm.upper_arm, arm.gripper_from_elbow),
+        kinematics=ArmKinematics(arm.upper_arm, arm.gripper_from_elbow, arm.fingertip_from_elbow),
         above_table=None if arm.above_table is None else _above_table(arm.above_table),
     )
 
 
 def _above_table(part: AboveTablePart) -> AboveTable:
     lowest, highest = (_frozen(ends) for ends in zip(*part.begin_within, strict=True))
-    via = np.deg2rad(part.via_deg)
-    via.flags.writeable = False
-    return AboveTable(lowest, highest, via)
+    return AboveTable(lowest, highest, _radians(part.via_deg))
 
 
 def _chain(names: tuple[str, ...], chain: ChainPart, lower: Floats, upper: Floats) -> Chain:
@@ -332,11 +324,11 @@ def _chain(names: tuple[str, ...], chain: ChainPart, lower: Floats, upper: Float
     )
 
 
-def _frozen(values: Iterable[float]) -> Floats:
+def _frozen(values: Iterable[float | tuple[float, ...]]) -> Floats:
     array = np.array(list(values), dtype=np.float64)
     array.flags.writeable = False
     return array
 
 
-def _radians(degrees: Iterable[float]) -> Floats:
+def _radians(degrees: Iterable[float | tuple[float, ...]]) -> Floats:
     return _frozen(np.deg2rad(list(degrees)))

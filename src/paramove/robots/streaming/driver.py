@@ -126,8 +126,9 @@ class ArmDriver:
         d = self._description
         self._epoch = 1 + (start_ns // 1_000_000) % (2**32 - 1)
         self._now_ns = self._began_ns = start_ns
-        mechanical = (d.lower, d.upper)
-        self._core = SafetyCore(self._limits, mechanical, self._epoch, start_ns, self._settings, self._clearance)
+        self._core = SafetyCore(
+            self._limits, (d.lower, d.upper), self._epoch, start_ns, self._settings, self._clearance
+        )
 
     @property
     def state(self) -> State:

@@ -169,8 +169,7 @@ class ServoChain:
     def write(self, number: int, register: Register, value: int) -> None:
         """Write one number of one servo. Raises ServoError."""
         parameters = [*register.address.to_bytes(2, "little"), *_bytes(register, value)]
-        packet = _packet(number, Instruction.WRITE, parameters)
-        answer = self._insist(packet, number, 0, ATTEMPTS_S)
+        answer = self._insist(_packet(number, Instruction.WRITE, parameters), number, 0, ATTEMPTS_S)
         if answer is None:
             raise _no_reply(number, f"write {register.name}")
         _check(number, answer, f"write {register.name} = {value}")
