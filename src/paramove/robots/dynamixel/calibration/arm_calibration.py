@@ -209,7 +209,7 @@ def sign_again(path: Path) -> ArmCalibration:
 
 def _contradiction(joint: JointCalibration) -> str:
     """What is wrong, "" if nothing is."""
-    model_named(joint.model)
+    modes = model_named(joint.model).modes
     travel = joint.max_counts - joint.min_counts
     if travel <= 0:
         return f"expected min_counts below max_counts, found {joint.min_counts} and {joint.max_counts}"
@@ -217,6 +217,6 @@ def _contradiction(joint: JointCalibration) -> str:
         return f"expected at most {LONGEST_TRAVEL} counts from min_counts to max_counts, found {travel}"
     if joint.operating_mode == POSITION_MODE and joint.max_counts >= PULSES_PER_TURN:
         return f"max_counts {joint.max_counts} is beyond the one turn of operating mode {POSITION_MODE}"
-    if joint.operating_mode not in model_named(joint.model).modes:
+    if joint.operating_mode not in modes:
         return f"{joint.model} has no operating mode {joint.operating_mode}"
     return ""

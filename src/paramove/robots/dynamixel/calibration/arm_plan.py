@@ -8,7 +8,6 @@ from pathlib import Path
 
 from paramove.documents import InputError
 from paramove.robots import Chain, RobotDescription
-from paramove.robots.dynamixel.bus.servo_models import model_named
 
 YAW = (
     "the hand swings to the left, seen from behind the arm",
@@ -81,7 +80,7 @@ def load_plan(folder: Path) -> ArmPlan:
         servo = PlannedServo(
             joint=joint,
             number=robot.servo_ids[index],
-            model=model_named(robot.motors[index]).name,
+            model=robot.motors[index],
             lower=float(robot.lower[index]),
             upper=float(robot.upper[index]),
             sign=1 if robot.units.counts_per_rad[index] > 0 else -1,

@@ -16,16 +16,7 @@ from paramove.robots.dynamixel.bus.servo_models import (
 from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration, CalibrationError, JointCalibration
 from paramove.robots.dynamixel.calibration.arm_plan import ArmPlan
 
-FILE, DESCRIPTION, SERVO = "file", "description", "servo"
-SETTINGS = (
-    "Return Delay Time",
-    "Drive Mode",
-    "Operating Mode",
-    "Homing Offset",
-    "Max Position Limit",
-    "Min Position Limit",
-)
-"""Stored without power; written while torque is off."""
+DESCRIPTION, SERVO = "description", "servo"
 
 
 @dataclass(frozen=True)
@@ -47,7 +38,10 @@ class Difference:
 
 
 def settings(joint: JointCalibration) -> dict[str, int]:
-    """Values of `SETTINGS` that its servo must have. In the other modes a servo ignores its limits."""
+    """What its servo must have in registers that are stored without power, and written while torque is off.
+
+    In the other modes than that of one turn a servo ignores its limits.
+    """
     within_turn = joint.operating_mode == POSITION_MODE
     return {
         "Return Delay Time": 0,
@@ -62,7 +56,7 @@ def settings(joint: JointCalibration) -> dict[str, int]:
 def read_settings(chain: ServoChain, joint: JointCalibration) -> dict[str, int]:
     """As `settings`, but those that the servo has. Raises ServoError."""
     registers = model_named(joint.model).registers
-    return {name: chain.read(joint.id, registers[name]) for name in SETTINGS}
+    return {name: chain.read(joint.id, registers[name]) for name in settings(joint)}
 
 
 def write_settings(chain: ServoChain, joint: JointCalibration) -> dict[str, tuple[int, int]]:
