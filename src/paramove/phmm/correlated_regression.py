@@ -28,6 +28,7 @@ from paramove.phmm.noise import distances_with_noise
 from paramove.phmm.predictive_distribution import PredictiveDistribution
 from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out, studentised_residuals
 from paramove.phmm.search_kernels import all_nearest
+from paramove.phmm.storage import check_shapes
 
 SHRINKAGES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
 """Candidates for the fraction of each variance that counts as independent."""
@@ -197,12 +198,9 @@ class CorrelatedRegression:
             for name in ("coefficients", "uncertainty", "unseen", "root", "distances", "groups", "scalars")
         }
         count, size, scalars = len(own["coefficients"]), len(monomials), own["scalars"]
-        expected: dict[str, tuple[int, ...]]
         expected = {"coefficients": (count, size), "uncertainty": (size, size), "unseen": (size, size)}
         expected |= {"root": (count, count), "distances": own["groups"].shape, "groups": (len(own["distances"]),)}
-        for name, shape in expected.items():
-            if own[name].shape != shape:
-                raise ValueError(f"expected {prefix}{name} of shape {shape}, found {own[name].shape}")
+        check_shapes(arrays, expected, prefix)
         if not (np.diagonal(own["root"]) > 0).all() or scalars.ndim != 1 or len(scalars) < 3 or not scalars[0] > 0:
             raise ValueError(f"expected a root with a positive diagonal and an inflation above 0 in {prefix}scalars")
         inflation, shrinkage, *ridge = (float(one) for one in scalars)

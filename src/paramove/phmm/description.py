@@ -1,6 +1,6 @@
 """Description of a movement model: action, points, unit, frame, names of the parameters."""
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from math import isfinite
 from typing import Any, Self
 
@@ -32,10 +32,6 @@ class MovementDescription:
     grasp: float = -1.0
     source: str = ""
     rate_hz: float = 0.0
-
-    def as_record(self) -> dict[str, Any]:
-        """Plain values for a file."""
-        return asdict(self)
 
     @classmethod
     def from_record(cls, record: dict[str, Any]) -> Self:

@@ -22,6 +22,7 @@ from paramove.phmm.beginnings import FIRST_FRAMES, check_beginning
 from paramove.phmm.left_out import folds_of
 from paramove.phmm.performance import movement_parts
 from paramove.phmm.predictive_distribution import PredictiveDistribution
+from paramove.phmm.storage import check_shapes
 
 SHRINKAGE, WHOLE_SHRINKAGE = 0.1, 0.02
 """Fraction of each variance that counts as independent, of beginnings and of complete movements."""
@@ -136,11 +137,9 @@ class Discriminant:
     def from_arrays(cls, arrays: Mapping[str, Floats], number: int, n_actions: int) -> Self:
         """From the result of `arrays`. Raises KeyError for a missing array, ValueError for shapes that do not fit."""
         means, root, scalars, usual = (arrays[f"{name}{number}"] for name in ("means", "root", "scalars", "usual"))
-        expected: dict[str, tuple[int, ...]] = {"means": (n_actions, root.shape[-1]), "root": (means.shape[-1],) * 2}
+        expected = {"means": (n_actions, root.shape[-1]), "root": (means.shape[-1],) * 2}
         expected |= {"scalars": (2 + n_actions,), "usual": (n_actions, 3)}
-        for name, shape in expected.items():
-            if arrays[f"{name}{number}"].shape != shape:
-                raise ValueError(f"expected {name}{number} of shape {shape}, found {arrays[f'{name}{number}'].shape}")
+        check_shapes(arrays, {f"{name}{number}": shape for name, shape in expected.items()})
         with np.errstate(divide="ignore"):
             log_priors, deviations = np.log(scalars[2:]), 1.0 / usual[:, 1]
         rows = zip(usual[:, 0].tolist(), deviations.tolist(), usual[:, 2].tolist(), strict=True)

@@ -28,9 +28,9 @@ from paramove.phmm.estimates import ParameterEstimate
 from paramove.phmm.examining import ExaminingPHMM, Residuals, inverse_information
 from paramove.phmm.features import Monomials
 from paramove.phmm.grid import ParameterGrid
-from paramove.phmm.local_models import check_local_models
 from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import TrainingData
+from paramove.phmm.storage import check_shapes, check_states
 
 REMEDY = "demonstrate every point of a grid, or train a QuadraticPHMM, which needs none"
 SEARCH_TOLERANCE = 1e-7
@@ -293,13 +293,9 @@ class InterpolativePHMM(ExaminingPHMM):
         self.means_, self.covariances_ = arrays["means"], arrays["covariances"]
         self.durations_ = arrays["durations"]
         dim, theta_dim = self.means_.shape[-1], self.grid_.dimension
-        states = (self.grid_.size, self.n_states)
-        expected = {"means": (*states, dim), "covariances": (*states, dim, dim), "durations": (*states, self.d_max_)}
-        expected |= {"grid_origin": (theta_dim,), "grid_edges": (theta_dim, theta_dim)}
-        for name, shape in expected.items():
-            if arrays[name].shape != shape:
-                raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
-        check_local_models(self.means_, self.covariances_, self.durations_, self.d_min_)
+        expected = {"means": (self.grid_.size, self.n_states, dim), "grid_origin": (theta_dim,)}
+        check_shapes(arrays, expected | {"grid_edges": (theta_dim, theta_dim)})
+        check_states(arrays, self.means_, self.d_min_, self.d_max_)
         self._prepared = None
         self._set_performances(arrays)
 

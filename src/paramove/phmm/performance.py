@@ -18,6 +18,7 @@ from paramove.phmm.correlated_regression import CorrelatedRegression
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, distances_with_noise, moving_average
 from paramove.phmm.predictive_distribution import PredictiveDistribution
+from paramove.phmm.storage import check_shapes
 
 PARTS, PART_FRAMES = 5, 20
 """A complete movement is described by the means of its fifths, of 20 interpolated frames each, and its last frame."""
@@ -163,9 +164,7 @@ class Performances:
         pace = Pace(arrays["pace_mean"], arrays["pace_root"], arrays["pace_distances"])
         expected = {"pace_mean": (PACE_PARTS,), "pace_root": (PACE_PARTS, PACE_PARTS)}
         expected |= {"pace_distances": complete.distances.shape, "estimating_root": complete.root.shape}
-        for name, shape in expected.items():
-            if arrays[name].shape != shape:
-                raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
+        check_shapes(arrays, expected)
         return cls(complete, beginnings, pace, estimating)
 
 

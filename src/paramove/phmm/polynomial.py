@@ -22,12 +22,12 @@ from paramove.phmm.description import MovementDescription
 from paramove.phmm.estimates import ParameterEstimate
 from paramove.phmm.examining import ExaminingPHMM, Residuals, inverse_information
 from paramove.phmm.features import Monomials
-from paramove.phmm.local_models import check_local_models
 from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import TrainingData
 from paramove.phmm.performance import state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
 from paramove.phmm.ridge import smoothed
+from paramove.phmm.storage import check_shapes, check_states
 from paramove.phmm.stretching import stretched
 
 MAX_STEPS = 40
@@ -216,18 +216,8 @@ class PolynomialPHMM(ExaminingPHMM):
         monomials = Monomials.of_degree(self.degree, np.stack([centre - scale, centre + scale]))
         monomials = Monomials(monomials.exponents, centre, scale)
         dim = arrays["coefficients"].shape[1]
-        expected: dict[str, tuple[int, ...]]
-        expected = {"coefficients": (self.n_states, dim, len(monomials)), "covariances": (self.n_states, dim, dim)}
-        expected |= {
-            "durations": (self.n_states, self.d_max_),
-            "theta_centre": centre.shape,
-            "theta_scale": centre.shape,
-        }
-        for name, shape in expected.items():
-            if arrays[name].shape != shape:
-                raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
-        local = (arrays["coefficients"][None, ..., 0], arrays["covariances"][None], arrays["durations"][None])
-        check_local_models(*local, self.d_min_)
+        check_shapes(arrays, {"coefficients": (self.n_states, dim, len(monomials)), "theta_scale": centre.shape})
+        check_states(arrays, arrays["coefficients"][..., 0], self.d_min_, self.d_max_)
         learned = (arrays["coefficients"], arrays["covariances"], arrays["durations"])
         self._set_learned(monomials, RegressedParameters(*learned, self.d_min_))
         self._set_performances(arrays)

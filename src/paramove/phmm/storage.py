@@ -1,4 +1,4 @@
-"""Model files: one .npz without pickles, checked when read."""
+"""Model files: one .npz without pickles, checked when read, and checks of what models read from it."""
 
 import json
 from collections.abc import Mapping
@@ -20,6 +20,7 @@ MAX_ARRAYS = 500
 """Each of the twenty fractions of unfinished movements has eight."""
 MAX_LETTERS = 100_000
 """Maximum of the header; that of a model with a description has 1 000."""
+ROUNDING = 1e-6
 
 
 class ModelFileError(InputError):
@@ -74,6 +75,53 @@ def read_record(path: Path) -> ModelRecord:
         raise ModelFileError(f"{path}: the header cannot be read: {error}") from error
 
 
+def check_shapes(arrays: Mapping[str, Floats], expected: Mapping[str, tuple[int, ...]], prefix: str = "") -> None:
+    """Check arrays whose names have this prefix. Raises ValueError with the first that has another shape."""
+    for name, shape in expected.items():
+        found = arrays[f"{prefix}{name}"].shape
+        if found != shape:
+            raise ValueError(f"expected {prefix}{name} of shape {shape}, found {found}")
+
+
+def check_states(arrays: Mapping[str, Floats], means: Floats, d_min: int, d_max: int) -> None:
+    """Check "covariances" (..., N, D, D) and "durations" (..., N, d_max) of HMMs with means (..., N, D).
+
+    Args:
+        arrays: of a file. p_i(d) is in column d - 1 of the durations.
+        means: of one HMM, or of several local ones.
+        d_min, d_max: minimum and maximum number of frames of a state.
+
+    Raises:
+        ValueError: for other shapes, covariances that are not symmetric and positive definite, and rows of durations
+            that are no distribution over d_min .. d_max; with the local model and the state.
+    """
+    if not means.size:
+        raise ValueError(f"expected means of some local models, found shape {means.shape}")
+    check_shapes(arrays, {"covariances": (*means.shape, means.shape[-1]), "durations": (*means.shape[:-1], d_max)})
+    covariances, durations = arrays["covariances"], arrays["durations"]
+    bad = np.argwhere((durations < 0).any(axis=-1) | (np.abs(durations.sum(axis=-1) - 1.0) > ROUNDING))
+    if len(bad):
+        row = durations[tuple(bad[0])]
+        raise ValueError(f"expected durations that sum to 1 with none below 0, found {row.tolist()} {_where(bad[0])}")
+    bad = np.argwhere(durations[..., : d_min - 1].any(axis=-1))
+    if len(bad):
+        raise ValueError(f"expected no duration below {d_min} frames, found one {_where(bad[0])}")
+    size = np.abs(covariances).max(axis=(-2, -1))
+    bad = np.argwhere(np.abs(covariances - np.swapaxes(covariances, -1, -2)).max(axis=(-2, -1)) > ROUNDING * size)
+    if len(bad):
+        raise ValueError(f"expected symmetric covariances, found one that is not {_where(bad[0])}")
+    minimum = np.linalg.eigvalsh(covariances)[..., 0]
+    bad = np.argwhere(minimum <= 0)
+    if len(bad):
+        eigenvalue = f"{minimum[tuple(bad[0])]:.3g} {_where(bad[0])}"
+        raise ValueError(f"expected covariances that are positive definite, found the eigenvalue {eigenvalue}")
+
+
+def _where(index: NDArray[np.intp]) -> str:
+    *local, state = index.tolist()
+    return f"in state {state}" + "".join(f" of local model {number}" for number in local)
+
+
 def _check_version(path: Path, found: NDArray[Any]) -> None:
     if found.shape != () or found.dtype.kind not in "iu":
         raise ModelFileError(f"{path}: expected a whole number as format version, found {found!r:.80}")
@@ -88,9 +136,7 @@ def _reject_constant(name: str) -> NoReturn:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, MovementDescription):
-        return value.as_record()
-    if isinstance(value, TrainingOptions):
+    if isinstance(value, MovementDescription | TrainingOptions):
         return asdict(value)
     return value.item() if isinstance(value, np.generic) else value
 

@@ -19,7 +19,6 @@ from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.examining import ExaminingPHMM
 from paramove.phmm.features import Monomials
-from paramove.phmm.local_models import check_local_models
 from paramove.phmm.network.choice import chosen_units, with_decay
 from paramove.phmm.network.networks import StateNetworks
 from paramove.phmm.network.training import NetworkParameters, NetworkPrior, SequenceMoments, train_networks
@@ -27,6 +26,7 @@ from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import TrainingData
 from paramove.phmm.regression import RegressedParameters, train_regressed
 from paramove.phmm.ridge import chosen_ridge
+from paramove.phmm.storage import check_states
 
 SMOOTHNESS = 0.05
 """Of the polynomial model whose alignment of frames and states the networks begin with."""
@@ -235,15 +235,7 @@ class NeuralPHMM(ExaminingPHMM):
         spanned = Monomials.of_degree(self.skip_degree, np.stack([centre - scale, centre + scale]))
         monomials = Monomials(spanned.exponents, centre, scale)
         networks = StateNetworks.from_arrays(arrays, self.n_states, len(monomials), len(centre))
-        dim = networks.skip.shape[1]
-        for name, shape in {
-            "covariances": (self.n_states, dim, dim),
-            "durations": (self.n_states, self.d_max_),
-        }.items():
-            if arrays[name].shape != shape:
-                raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
-        local = (networks.skip[None, ..., 0], arrays["covariances"][None], arrays["durations"][None])
-        check_local_models(*local, self.d_min_)
+        check_states(arrays, networks.skip[..., 0], self.d_min_, self.d_max_)
         self._set_learned(monomials, networks, arrays["covariances"], arrays["durations"])
         units = replace(monomials, units=networks.inner[-1])
         self._set_performances(arrays, units)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import expit
 
 from paramove.documents import Floats
+from paramove.phmm.storage import check_shapes
 
 INNER_DEVIATION = 3.0
 """Standard deviation of the prior on W1 and b1, for theta scaled to [-1, 1]: steps as steep as a fifth of the range."""
@@ -37,10 +38,8 @@ class StateNetworks:
     def from_arrays(cls, arrays: dict[str, Floats], n_states: int, n_features: int, n_components: int) -> StateNetworks:
         """From a file's "skip", "outer" and "inner". Raises ValueError for shapes that do not fit together."""
         dim, hidden = arrays["skip"].shape[1], arrays["inner"].shape[1]
-        expected = {"skip": (dim, n_features), "outer": (dim, hidden), "inner": (hidden, n_components + 1)}
-        for name, shape in expected.items():
-            if arrays[name].shape != (n_states, *shape):
-                raise ValueError(f"expected {name} of shape {(n_states, *shape)}, found {arrays[name].shape}")
+        expected = {"skip": (n_states, dim, n_features), "outer": (n_states, dim, hidden)}
+        check_shapes(arrays, expected | {"inner": (n_states, hidden, n_components + 1)})
         return cls(arrays["skip"], arrays["outer"], arrays["inner"])
 
     def means(self, positions: Floats, features: Floats) -> Floats:
