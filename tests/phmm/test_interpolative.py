@@ -180,11 +180,3 @@ def test_resampled_frames_make_any_length_fit() -> None:
     assert np.isfinite(model.fit(shown, theta).log_likelihood(shown[0], theta[0]))
     assert len(model.synthesize([0.0, 0.25], duration=2.0)) == 121
     assert len(model.synthesize([0.0, 0.25], 200, timing="expected")) == 200
-
-
-def test_local_models_make_the_same_model_again(model: InterpolativePHMM) -> None:
-    again = InterpolativePHMM.from_local_models(model.grid_, model.local_models())
-    assert_allclose(again.state_means([0.1, 0.3]), model.state_means([0.1, 0.3]), rtol=0.0, atol=0.0)
-    assert (again.n_states, again.d_min, again.d_max) == (20, 2, 4)
-    with pytest.raises(ValueError, match="expected 6 local models, one per grid point, found 5"):
-        InterpolativePHMM.from_local_models(model.grid_, model.local_models()[:5])

@@ -13,25 +13,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from paramove.hmm.estimation import Parameters
 from paramove.phmm import InterpolativePHMM, ModelFileError, MovementDescription, ParameterGrid, ParametricHMM, storage
 
 Content = dict[str, np.ndarray]
 
 
 def small_model() -> InterpolativePHMM:
-    """Four local models of 5 states in 3 dimensions."""
+    """Four local models of 5 states in 3 dimensions, with nothing else that training gives."""
     grid = ParameterGrid.from_lines([0.0, 1.0], [0.0, 2.0])
-    local = [
-        Parameters(
-            np.outer(np.arange(5.0), [1.0, 0.5, corner[0]]) + corner[1],
-            np.tile(0.01 * np.eye(3), (5, 1, 1)),
-            np.tile([0.0, 0.6, 0.4], (5, 1)),
-            2,
-        )
-        for corner in grid.points()
-    ]
-    return InterpolativePHMM.from_local_models(grid, local, description=MovementDescription("wave", ("hand",)))
+    corners = grid.points()
+    description = MovementDescription("wave", ("hand",))
+    model = InterpolativePHMM(5, 2, 3, residuals="independent", description=description)
+    model.parameter_bounds_ = np.stack([corners.min(axis=0), corners.max(axis=0)])
+    model._set_grid(grid)
+    model.means_ = np.stack([np.outer(np.arange(5.0), [1.0, 0.5, corner[0]]) + corner[1] for corner in corners])
+    model.covariances_ = np.tile(0.01 * np.eye(3), (4, 5, 1, 1))
+    model.durations_ = np.tile([0.0, 0.6, 0.4], (4, 5, 1))
+    return model
 
 
 @pytest.fixture

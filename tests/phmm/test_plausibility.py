@@ -92,8 +92,13 @@ def test_noise_is_no_speed() -> None:
     assert seen.remarks(UNSEEN + 0.05 * rng.standard_normal(UNSEEN.shape), True) == ()
 
 
-def test_given_models_have_seen_nothing(models: dict[type[ParametricHMM], ParametricHMM]) -> None:
-    known = models[InterpolativePHMM]
-    assert isinstance(known, InterpolativePHMM)
-    bare = InterpolativePHMM.from_local_models(known.grid_, known.local_models(), resampled_frames=100)
+def test_without_the_range_of_the_training_nothing_is_unusual(
+    models: dict[type[ParametricHMM], ParametricHMM], tmp_path: Path
+) -> None:
+    models[InterpolativePHMM].save(tmp_path / "model.npz")
+    with np.load(tmp_path / "model.npz", allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files if name != "learned_training_range"}
+    np.savez(tmp_path / "bare.npz", **arrays)
+    bare = ParametricHMM.load(tmp_path / "bare.npz")
+    assert bare.training_range_ is None
     assert bare.remarks(UNSEEN[:40]) == ()

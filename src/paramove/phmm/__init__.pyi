@@ -4,7 +4,6 @@ from .classification import MovementClassifier as MovementClassifier
 from .description import MovementDescription as MovementDescription
 from .estimates import Examination as Examination
 from .estimates import ParameterEstimate as ParameterEstimate
-from .examining import has_p_values as has_p_values
 from .grid import ParameterGrid as ParameterGrid
 from .interpolative import InterpolativePHMM as InterpolativePHMM
 from .interpolative import synchronised as synchronised
@@ -12,6 +11,7 @@ from .model_cache import cached_model as cached_model
 from .model_cache import stored_model as stored_model
 from .network.model import NeuralPHMM as NeuralPHMM
 from .parametric import ParametricHMM as ParametricHMM
+from .parametric import has_p_values as has_p_values
 from .performance import groups_of as groups_of
 from .plausibility import UnlikelyMovementWarning as UnlikelyMovementWarning
 from .polynomial import CubicPHMM as CubicPHMM

@@ -15,8 +15,7 @@ from paramove.documents import Floats, renamed_attribute
 from paramove.hmm import checked_sequence, checked_sequences, not_fitted
 from paramove.phmm.discriminant import Discriminant, discriminant_for, discriminants
 from paramove.phmm.estimates import ParameterEstimate
-from paramove.phmm.examining import ExaminingPHMM, has_p_values
-from paramove.phmm.parametric import ParametricHMM
+from paramove.phmm.parametric import ParametricHMM, has_p_values
 from paramove.phmm.performance import groups_of
 from paramove.phmm.polynomial import QuadraticPHMM
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
@@ -212,7 +211,6 @@ def _result(model: ParametricHMM, sequence: Floats, finished: bool) -> tuple[Par
     Scores of models with correlated residuals are logarithms of p-values: densities of movements that lie far from
     every model (another person's) would compare the widths of the models instead of the distances from them.
     """
-    assert isinstance(model, ExaminingPHMM)
     recorded = checked_sequence(sequence, model.covariances_.shape[-1])
     if has_p_values(model):
         examination = model._expecting_noise_of(recorded)._examined(recorded, finished)

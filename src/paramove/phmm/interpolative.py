@@ -6,7 +6,7 @@ States of all local HMMs model the same part of the movement (3.4.1).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Self, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,11 +25,10 @@ from paramove.hmm import (
 from paramove.phmm import interpolation_kernels
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.estimates import ParameterEstimate
-from paramove.phmm.examining import ExaminingPHMM, Residuals, inverse_information
 from paramove.phmm.features import Monomials
 from paramove.phmm.grid import ParameterGrid
 from paramove.phmm.noise import AddedNoise
-from paramove.phmm.parametric import TrainingData
+from paramove.phmm.parametric import ParametricHMM, Residuals, TrainingData, inverse_information
 from paramove.phmm.storage import check_shapes, check_states
 
 REMEDY = "demonstrate every point of a grid, or train a QuadraticPHMM, which needs none"
@@ -78,7 +77,7 @@ def _refined(
     ]
 
 
-class InterpolativePHMM(ExaminingPHMM):
+class InterpolativePHMM(ParametricHMM):
     """Local HMMs at the points of a grid of any size and dimension, interpolated in between (3.6), (3.8)-(3.10).
 
     Outside the grid the means extrapolate; the weights of covariances and durations are clamped (corrected). (3.6) is
@@ -128,30 +127,6 @@ class InterpolativePHMM(ExaminingPHMM):
         self.residuals = residuals
         self.search_margin = search_margin
 
-    @classmethod
-    def from_local_models(cls, grid: ParameterGrid, local: Sequence[Parameters], **parameters: Any) -> Self:
-        """A model made of given local HMMs, one per grid point in the order of `grid.points()` (thesis 5.2.3).
-
-        `parameters` are further constructor arguments. The model has seen no executions: its residuals are independent.
-        Raises ValueError where number or shapes differ.
-        """
-        if len(local) != grid.size:
-            raise ValueError(f"expected {grid.size} local models, one per grid point, found {len(local)}")
-        kinds = {(one.means.shape, one.durations.shape, one.d_min) for one in local}
-        if len(kinds) != 1:
-            raise ValueError(f"all local models have the same shapes and d_min, found {sorted(kinds)}")
-        (states, _), (_, d_max), d_min = kinds.pop()
-        model = cls(states, d_min, d_max, **{**parameters, "residuals": "independent"})
-        corners = grid.points()
-        model.parameter_bounds_ = np.stack([corners.min(axis=0), corners.max(axis=0)])
-        model._set_local(grid, local)
-        return model
-
-    def local_models(self) -> list[Parameters]:
-        """The local HMMs in the order of `grid_.points()`."""
-        stored = zip(self.means_, self.covariances_, self.durations_, strict=True)
-        return [Parameters(means, covariances, durations, self.d_min_) for means, covariances, durations in stored]
-
     def _fit(self, data: TrainingData) -> None:
         grid = self._grid_for(data.theta)
         groups = grouped(data.sequences, data.theta, grid)
@@ -159,7 +134,10 @@ class InterpolativePHMM(ExaminingPHMM):
         everything = LeftRightHMM(self.n_states, self.d_min_, self.d_max_, options=options).fit(data.sequences)
         local = synchronised(everything.parameters, groups, options, self.local_iterations)
         self.training_ = everything.training_
-        self._set_local(grid, local)
+        self._set_grid(grid)
+        self.means_ = np.stack([one.means for one in local])
+        self.covariances_ = np.stack([one.covariances for one in local])
+        self.durations_ = np.stack([one.durations for one in local])
         self.performances_ = self._fitted_performances(data)
 
     def _grid_for(self, theta: Floats) -> ParameterGrid:
@@ -167,16 +145,9 @@ class InterpolativePHMM(ExaminingPHMM):
             return ParameterGrid.from_theta(theta)
         return ParameterGrid.from_corners(self.corners, self.shape or (2,) * theta.shape[1])
 
-    def _set_local(self, grid: ParameterGrid, local: Sequence[Parameters]) -> None:
-        self._set_grid(grid)
-        self.means_ = np.stack([one.means for one in local])
-        self.covariances_ = np.stack([one.covariances for one in local])
-        self.durations_ = np.stack([one.durations for one in local])
-        self._prepared = None
-
     def _set_grid(self, grid: ParameterGrid) -> None:
         """Executions depend on theta by a quadratic polynomial, or a cubic one if the grid has as many lines."""
-        self.grid_ = grid
+        self.grid_, self._prepared = grid, None
         self.monomials_ = Monomials.of_degree(3 if max(grid.shape) > 3 else 2, grid.points())
 
     def _coordinates(self, theta: ArrayLike) -> Floats:
@@ -212,7 +183,8 @@ class InterpolativePHMM(ExaminingPHMM):
         """
         from scipy.optimize import minimize  # imported where it is needed: it takes half a second
 
-        columns, arrays, grid = np.ascontiguousarray(self._checked(recorded).T), self._kernel_arrays(), self.grid_
+        columns = np.ascontiguousarray(self._resampled_for_states(recorded).T)
+        arrays, grid = self._kernel_arrays(), self.grid_
 
         def minus_log_likelihood(position: Floats, cell: Ints) -> tuple[float, Floats]:
             value, gradient, _ = interpolation_kernels.expectation_at(position, cell, columns, *arrays)
@@ -230,8 +202,8 @@ class InterpolativePHMM(ExaminingPHMM):
         covariance = edges.T @ inverse_information(information, 1.0 + 2.0 * self.search_margin) @ edges
         return ParameterEstimate(grid.theta(best.x), covariance, float(value))
 
-    def _log_likelihood_at(self, checked: Floats, theta: Floats) -> float:
-        position, columns = self.grid_.coordinates(theta), np.ascontiguousarray(checked.T)
+    def _log_likelihood_at(self, resampled: Floats, theta: Floats) -> float:
+        position, columns = self.grid_.coordinates(theta), np.ascontiguousarray(resampled.T)
         cell = self.grid_.cell(position)
         return float(interpolation_kernels.value_at(position, cell, columns, *self._kernel_arrays()))
 
@@ -296,7 +268,6 @@ class InterpolativePHMM(ExaminingPHMM):
         expected = {"means": (self.grid_.size, self.n_states, dim), "grid_origin": (theta_dim,)}
         check_shapes(arrays, expected | {"grid_edges": (theta_dim, theta_dim)})
         check_states(arrays, self.means_, self.d_min_, self.d_max_)
-        self._prepared = None
         self._set_performances(arrays)
 
 

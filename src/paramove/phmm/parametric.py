@@ -1,4 +1,8 @@
-"""The interface of all parametric HMMs: trained on labelled movements, evaluated at any parameter."""
+"""What all parametric HMMs have in common: trained on labelled movements, they estimate theta and synthesise movements.
+
+They also learn how whole executions vary: that gives theta an honest region, and movements an outlier score and a
+p-value.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +10,13 @@ import importlib
 import inspect
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from math import ceil
 from numbers import Integral
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,21 +33,31 @@ from paramove.hmm import (
     check_length,
     checked_sequence,
     checked_sequences,
+    interpolate,
+    minimum_jerk,
     not_fitted,
     resample,
 )
 from paramove.hmm import Path as PathKind
+from paramove.phmm.adaptation import Adaptation
+from paramove.phmm.conditioning import deviation
 from paramove.phmm.description import MovementDescription
-from paramove.phmm.estimates import ParameterEstimate
+from paramove.phmm.estimates import Examination, ParameterEstimate
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, NoiseLevel
-from paramove.phmm.performance import groups_of
+from paramove.phmm.performance import OUTLIER_SHRINKAGE, Performances, groups_of, movement_parts, state_averages
 from paramove.phmm.plausibility import TrainingRange, UnlikelyMovementWarning
 from paramove.phmm.ridge import smoothed
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 
 MAX_FRAMES = 100_000
 DEFAULT_FRAMES, STATE_MARGIN = 100, 0.2
+Residuals = Literal["independent", "correlated"]
+INDEPENDENT = "this model has independent residuals: train it with residuals='correlated'"
+FOLLOWED = 0.9
+"""Fraction of the correlations of executions that conditions follow."""
+START = 0.05
+"""Conditions up to this fraction of a movement are conditions on its start."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +80,8 @@ class TrainingData:
 class ParametricHMM(ABC):
     """A family of left-right HMMs lambda^theta (thesis chapter 3); theta in the user's unit, shape (P,).
 
+    Theta is estimated by generalised least squares of whole executions, complete or just begun.
+
     Args:
         n_states, d_min, d_max: as in `LeftRightHMM`. Without d_min and d_max states last as long as the frames allow,
             up to a fifth shorter or longer; with one of them alone, from one frame, or up to twice d_min.
@@ -75,16 +91,27 @@ class ParametricHMM(ABC):
         description: labels that are saved with the model.
 
     Attributes:
+        residuals: "correlated", or "independent" if the model does not learn how whole executions vary.
+        search_margin: how far outside the training's bounds `estimate` searches, as a fraction of their width.
         d_min_, d_max_, resampled_frames_: those in use.
+        monomials_: features of theta.
+        covariances_: of the states, shape (..., N, D, D).
+        performances_: distribution of whole executions; None with independent residuals.
         parameter_bounds_: minimum and maximum theta of the training, shape (2, P).
-        training_theta_: the different theta of the training, shape (K, P); None in files of earlier releases.
+        training_theta_: the different theta of the training, shape (K, P); None in files without them.
         log_frames_: coefficients of the logarithm of a movement's number of frames, linear in theta, (P + 1,); None in
-            models made of given HMMs.
+            files without them.
         flat_theta_: whether theta of the training was (K,), which `predict` then returns.
-        training_noise_: noise of the training; None in files of earlier releases, which then ignore noise.
-        training_range_: unit, durations and speeds of the training; None in models made of given HMMs.
+        training_noise_: noise of the training; None in files without it, which then ignore noise.
+        training_range_: unit, durations and speeds of the training; None in files without them.
         training_: summary of the training.
     """
+
+    monomials_: Monomials
+    covariances_: Floats
+    performances_: Performances | None = None
+    residuals: Residuals = "correlated"
+    search_margin: float
 
     def __init__(
         self,
@@ -139,28 +166,16 @@ class ParametricHMM(ABC):
         """The HMM for one parameter."""
 
     @abstractmethod
-    def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
-        """The parameter that makes a sequence most likely (thesis 4.1.2.3).
-
-        With `finished=False` the sequence is the beginning of a movement, at the frame rate of the training.
-
-        Raises ValueError for another unit than that of the training. Warns (`UnlikelyMovementWarning`) of sequences
-        that seem to have another frame rate, or to be no complete movement.
-        """
-
-    def remarks(self, sequence: ArrayLike, *, finished: bool = True) -> tuple[str, ...]:
-        """What makes a sequence hardly a movement, or the beginning of one, at the frame rate of the training."""
-        if self.training_range_ is None:
-            return ()
-        return self.training_range_.remarks(checked_sequence(sequence), finished)
-
-    @abstractmethod
-    def adapt(self, sequences: Sequence[ArrayLike], theta: ArrayLike | None = None) -> Self:
-        """This model of other persons, adapted to a person of whom there are a few movements (T_k, D)."""
-
-    @abstractmethod
     def state_means(self, theta: ArrayLike) -> Floats:
         """Means of all states for one theta (P,) or many (M, P). Shape (N, D) or (M, N, D)."""
+
+    @abstractmethod
+    def _log_likelihood_at(self, resampled: Floats, theta: Floats) -> float:
+        """ln p(X | lambda^theta) of a sequence as the HMM takes it."""
+
+    @abstractmethod
+    def _move_means(self, change: Floats) -> None:
+        """Add coefficients of the monomials (N, D, F) to the means; changes a copy of a trained model."""
 
     @abstractmethod
     def _fit(self, data: TrainingData) -> None:
@@ -186,8 +201,7 @@ class ParametricHMM(ABC):
         recorded = checked_sequences(sequences)
         checked = [self._resampled(sequence) for sequence in recorded]
         labels = checked_theta(theta, len(checked))
-        floor = self._training_options().floor_deviation
-        check_training(recorded, checked, labels, (self.n_states, self.d_min_, self.d_max_), floor)
+        self._check_training(recorded, checked, labels)
         numbers = groups_of(groups, labels)
         self._fit(TrainingData(checked, recorded, labels, numbers))
         self.parameter_bounds_ = np.stack([labels.min(axis=0), labels.max(axis=0)])
@@ -202,6 +216,65 @@ class ParametricHMM(ABC):
     def log_likelihood(self, sequence: ArrayLike, theta: ArrayLike) -> float:
         """ln p(X | lambda^theta)."""
         return self.at(theta).log_likelihood(self._resampled(checked_sequence(sequence)))
+
+    def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
+        """The most likely theta, its covariance, and the log-likelihood there, of a movement or of its beginning.
+
+        Theta follows from `movement_parts` by generalised least squares; with independent residuals it is the maximum
+        of the likelihood of frames (thesis 4.1.2.3). A beginning (`finished=False`) has the frame rate of the training;
+        its log-likelihood is that of its points.
+
+        Raises ValueError for another unit than that of the training. Warns (`UnlikelyMovementWarning`) of sequences
+        that seem to have another frame rate, or to be no complete movement.
+        """
+        return self._estimate(self._recorded(sequence, finished), finished)
+
+    def examine(self, sequence: ArrayLike, *, finished: bool = True) -> Examination:
+        """Estimate of theta, outlier score and p-value of the sequence.
+
+        Raises ValueError for a model with independent residuals, which has no distribution of executions, and for a
+        beginning of fewer frames than are modelled.
+        """
+        recorded = self._recorded(sequence, finished)
+        return self._expecting_noise_of(recorded)._examined(recorded, finished)
+
+    def remarks(self, sequence: ArrayLike, *, finished: bool = True) -> tuple[str, ...]:
+        """What makes a sequence hardly a movement, or the beginning of one, at the frame rate of the training."""
+        if self.training_range_ is None:
+            return ()
+        return self.training_range_.remarks(checked_sequence(sequence), finished)
+
+    def adapt(self, sequences: Sequence[ArrayLike], theta: ArrayLike | None = None) -> Self:
+        """This model of other persons, adapted to a person of whom there are a few movements: about three suffice.
+
+        Args:
+            sequences: movements of the person, (T_k, D) each.
+            theta: their labels, (K, P). Without them only what is synthesised adapts, since a habit of the person and
+                an effect of theta cannot be distinguished: estimates and regions stay those of an unknown person.
+
+        Raises NotFittedError before training, ValueError for sequences and labels that do not fit.
+        """
+        self._check_trained()
+        recorded = [self._recorded(one, finished=True) for one in checked_sequences(sequences)]
+        known = np.array([self._estimate(one, finished=True).theta for one in recorded]) if theta is None else theta
+        labels = self._checked_theta(checked_theta(known, len(recorded)))
+        averages = []
+        for sequence, one in zip(recorded, labels, strict=True):
+            frames = self._resampled_for_states(sequence)
+            averages.append(state_averages(self.at(one).responsibilities(frames).T, frames))
+        adaptation = Adaptation.of(self.monomials_, labels)
+        missed = np.stack(averages) - self.state_means(labels)
+        change = adaptation.change(missed.reshape(len(labels), -1))
+        model = copy(self)
+        model._move_means(change.reshape(*missed.shape[1:], -1))
+        if self.log_frames_ is not None:
+            linear = Monomials.of_degree(1, np.asarray(self.parameter_bounds_)).at(labels)
+            late = np.log([[len(sequence)] for sequence in recorded]) - (linear @ self.log_frames_)[:, None]
+            model.log_frames_ = self.log_frames_ + adaptation.change(late)[0, : linear.shape[1]]
+        if theta is not None and self.performances_ is not None:
+            whole = Adaptation.of(self.performances_.complete.monomials, labels)
+            model.performances_ = self.performances_.adapted(recorded, labels, whole)
+        return model
 
     def predict(self, sequences: Sequence[ArrayLike], return_cov: bool = False) -> Floats | tuple[Floats, Floats]:
         """Theta of many movements, (K, P), or (K,) if labels were; with `return_cov` also covariances (K, P, P)."""
@@ -237,6 +310,52 @@ class ParametricHMM(ABC):
                 raise ValueError("give n_samples or duration, not both")
             n_samples = max(2, round(duration * sample_rate) + 1)
         return self.at(theta).synthesize(n_samples, timing, path)
+
+    def synthesize_through(self, theta: ArrayLike, via: Mapping[float, ArrayLike], n_samples: int) -> Floats:
+        """The most likely movement for theta (P,) that passes given poses. Shape (n_samples, D).
+
+        It deviates from `synthesize` as whole executions do: along the model's covariance, smooth to the acceleration.
+
+        Args:
+            theta: (P,).
+            via: poses (D,) by the fraction of the movement at which they are passed, 0 to 1; NaN leaves a coordinate
+                free. More than about five are met approximately. Without one at the start it starts as usual.
+            n_samples: of the movement.
+
+        Raises ValueError for poses and fractions that do not fit, and for independent residuals, which know no
+        executions.
+        """
+        mean, covariance = self.synthesize(theta, n_samples), self._covariance_of_executions()
+        missed: dict[float, Floats] = {}
+        for progress, pose in via.items():
+            wanted = np.asarray(pose, dtype=np.float64)
+            if wanted.shape != mean.shape[1:] or np.isinf(wanted).any() or not 0.0 <= progress <= 1.0:
+                raise ValueError(
+                    f"via has poses of {mean.shape[1]} numbers by fractions from 0 to 1, found shape {wanted.shape} at "
+                    f"{progress}"
+                )
+            missed[progress] = wanted - interpolate(mean, np.array([progress * (n_samples - 1)]))[0]
+        if not missed:
+            return mean
+        if min(missed) > START:
+            missed[0.0] = np.zeros(mean.shape[1])
+        result: Floats = mean + deviation(missed, covariance, n_samples)
+        return result
+
+    def redirect(self, movement: ArrayLike, theta: ArrayLike, at: float, within: float = 0.3) -> Floats:
+        """A movement (n, D) that from a fraction `at` of it on turns to another theta (P,). Shape (n, D).
+
+        Within a further fraction, at most what is left, it becomes the movement of the new theta, by a minimum-jerk
+        transition: continuous to the acceleration, and never outside both.
+
+        Raises ValueError for fractions that do not fit.
+        """
+        made = checked_sequence(movement, self._dimension())
+        if not 0.0 <= at < 1.0 or not within > 0.0:
+            raise ValueError(f"expected 0 <= at < 1 and within > 0, found {at} and {within}")
+        turned = minimum_jerk(np.linspace(0.0, 1.0, len(made)), at, min(at + within, 1.0))[:, None]
+        result: Floats = made + turned * (self.synthesize(theta, len(made)) - made)
+        return result
 
     def natural_frames(self, theta: ArrayLike) -> Any:
         """How many frames a movement of theta takes, at the frame rate of the training.
@@ -304,16 +423,14 @@ class ParametricHMM(ABC):
         """Write the trained model to one .npz file. Raises NotFittedError before training."""
         self._check_trained()
         arrays = {"parameter_bounds": np.asarray(self.parameter_bounds_), **self._arrays()}
-        if self.flat_theta_:
-            arrays["flat_theta"] = np.ones(1)
-        if self.log_frames_ is not None:
-            arrays["log_frames"] = self.log_frames_
-        if self.training_theta_ is not None:
-            arrays["training_theta"] = self.training_theta_
-        if self.training_noise_ is not None:
-            arrays["training_noise"] = self.training_noise_.array()
-        if self.training_range_ is not None:
-            arrays["training_range"] = self.training_range_.array()
+        optional = {
+            "flat_theta": np.ones(1) if self.flat_theta_ else None,
+            "log_frames": self.log_frames_,
+            "training_theta": self.training_theta_,
+            "training_noise": self.training_noise_ and self.training_noise_.array(),
+            "training_range": self.training_range_ and self.training_range_.array(),
+        }
+        arrays |= {name: array for name, array in optional.items() if array is not None}
         write_record(Path(path), ModelRecord(type(self).__name__, self.get_params(), self.training_, arrays))
 
     @classmethod
@@ -354,9 +471,7 @@ class ParametricHMM(ABC):
 
     def _expecting_noise_of(self, recorded: Floats) -> Self:
         """This model, or if a recorded sequence has more noise than the training, one that expects this noise."""
-        noise = None
-        if self.training_noise_ is not None:
-            noise = self.training_noise_.added(recorded, self.resampled_frames_)
+        noise = self.training_noise_ and self.training_noise_.added(recorded, self.resampled_frames_)
         if noise is None:
             return self
         model = copy(self)
@@ -364,8 +479,78 @@ class ParametricHMM(ABC):
         model._expect(noise)
         return model
 
-    def _expect(self, noise: AddedNoise) -> None:  # noqa: B027 (a model may leave noise to the likelihood)
+    def _expect(self, noise: AddedNoise) -> None:
         """Expect this noise in sequences; changes a copy of a trained model."""
+        self.covariances_ = self.covariances_ + noise.of_states
+        if self.performances_ is not None:
+            self.performances_ = self.performances_.expecting(noise)
+
+    def _estimate(self, recorded: Floats, finished: bool) -> ParameterEstimate:
+        model = self._expecting_noise_of(recorded)
+        if not finished:
+            return model._examined(recorded, finished).estimate
+        if model.performances_ is None:
+            return model._most_likely(recorded)
+        return model._estimated(recorded, model.performances_)[0]
+
+    def _recorded(self, sequence: ArrayLike, finished: bool) -> Floats:
+        recorded = checked_sequence(sequence, self._dimension())
+        self._warn(recorded, finished)
+        return recorded
+
+    def _most_likely(self, recorded: Floats) -> ParameterEstimate:
+        """Of a complete movement of independent frames, with noise as in the training."""
+        raise NotImplementedError(f"a {type(self).__name__} has correlated residuals")
+
+    def _examined(self, recorded: Floats, finished: bool) -> Examination:
+        if self.performances_ is None:
+            raise ValueError(INDEPENDENT)
+        if not finished:
+            return self.performances_.beginnings.examined(recorded, self.search_margin, self.performances_.noise)
+        estimate, parts = self._estimated(recorded, self.performances_)
+        complete = self.performances_.complete
+        distance = float(
+            complete.distances_from(parts[None], complete.estimates(parts[None], self.search_margin)[0])[0]
+        )
+        outlier_score = self.performances_.outlier_score(distance, self.performances_.pace.distance(recorded))
+        density = complete.log_density(distance)
+        return Examination(estimate, outlier_score, density, self.performances_.log_p_value(outlier_score))
+
+    def _estimated(self, recorded: Floats, performances: Performances) -> tuple[ParameterEstimate, Floats]:
+        """Estimate from the distribution of whole executions, and the description of this one."""
+        resampled = self._resampled_for_states(recorded)
+        parts = movement_parts(recorded)
+        (theta,), (covariance,) = performances.estimating.estimates(parts[None], self.search_margin)
+        return ParameterEstimate(theta, covariance, self._log_likelihood_at(resampled, theta)), parts
+
+    def _dimension(self) -> int:
+        self._check_trained()
+        return int(self.covariances_.shape[-1])
+
+    def _covariance_of_executions(self) -> Floats:
+        if self.performances_ is None:
+            raise ValueError(INDEPENDENT)
+        regression = self.performances_.complete
+        covariance = regression.root @ regression.root.T
+        diagonal = np.diag(np.diagonal(covariance))
+        # Detection of outliers takes half of the correlations for chance; synthesis follows nearly all of them.
+        result: Floats = diagonal + FOLLOWED / (1.0 - OUTLIER_SHRINKAGE) * (covariance - diagonal)
+        return result
+
+    def _fitted_performances(self, data: TrainingData, features: Monomials | None = None) -> Performances | None:
+        """Distribution of whole executions with these features of theta; None with independent residuals."""
+        if self.residuals not in get_args(Residuals):
+            raise ValueError(f"residuals are {' or '.join(get_args(Residuals))}, found {self.residuals!r}")
+        if self.residuals == "independent":
+            return None
+        return Performances.fitted(data.recorded, data.theta, features or self.monomials_, data.groups)
+
+    def _performance_arrays(self) -> dict[str, Floats]:
+        return {} if self.performances_ is None else self.performances_.arrays()
+
+    def _set_performances(self, arrays: dict[str, Floats], features: Monomials | None = None) -> None:
+        correlated = self.residuals == "correlated"
+        self.performances_ = Performances.from_arrays(arrays, features or self.monomials_) if correlated else None
 
     def _warn(self, recorded: Floats, finished: bool) -> None:
         """Of what is unusual about a sequence. Raises ValueError for another unit."""
@@ -388,6 +573,25 @@ class ParametricHMM(ABC):
         if self.n_states < 1 or not isinstance(self.description, MovementDescription | None):
             raise ValueError(f"expected at least one state, found {self.n_states}")
 
+    def _check_training(self, recorded: Sequence[Floats], resampled: Sequence[Floats], theta: Floats) -> None:
+        """Check movements as they were recorded and as they are trained on, (T_k, D) each, and theta (K, P).
+
+        Raises:
+            SequenceLengthError: for a length that the states do not allow, with the number of the sequence.
+            ValueError: for sequences that no model can learn from, and for one theta alone.
+        """
+        check_demonstrations(recorded, self._training_options().floor_deviation)
+        for index, sequence in enumerate(resampled):
+            try:
+                check_length(len(sequence), self.n_states, self.d_min_, self.d_max_)
+            except SequenceLengthError as error:
+                raise SequenceLengthError(f"sequence {index}: {error}") from error
+        if (theta == theta[0]).all():
+            raise ValueError(
+                f"theta is {theta[0].tolist()} for every sequence: nothing shows how the movement depends on it; give "
+                "sequences with different theta, or train a LeftRightHMM, which has no parameters"
+            )
+
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         _CLASSES[cls.__name__] = cls
@@ -398,6 +602,20 @@ class ParametricHMM(ABC):
 
     def _training_options(self) -> TrainingOptions:
         return self.options if self.options is not None else TrainingOptions()
+
+    def _resampled_for_states(self, recorded: Floats) -> Floats:
+        """As the HMM takes it. Raises SequenceLengthError for a length that the states do not allow."""
+        resampled = self._resampled(recorded)
+        check_length(len(resampled), self.n_states, self.d_min_, self.d_max_)
+        return resampled
+
+    def _checked_theta(self, theta: ArrayLike) -> Floats:
+        self._check_trained()
+        values = np.asarray(theta, dtype=np.float64)
+        n_components = len(self.monomials_.centre)
+        if values.shape[-1:] != (n_components,) or values.ndim > 2 or not np.isfinite(values).all():
+            raise ValueError(f"theta has {n_components} finite components, found shape {values.shape}: {values}")
+        return values
 
     def _resampled(self, sequence: Floats) -> Floats:
         frames = self.resampled_frames_
@@ -431,26 +649,13 @@ def checked_theta(theta: ArrayLike, count: int) -> Floats:
     return labels
 
 
-def check_training(
-    recorded: Sequence[Floats], resampled: Sequence[Floats], theta: Floats, states: tuple[int, int, int], floor: float
-) -> None:
-    """Check movements as they were recorded and as they are trained on, (T_k, D) each, and theta (K, P).
+def has_p_values(model: ParametricHMM) -> bool:
+    """Whether a model describes how demonstrations vary, and so which movements are outliers."""
+    return model.performances_ is not None
 
-    Args:
-        states: n_states, d_min, d_max. floor: `floor_deviation` of the options.
 
-    Raises:
-        SequenceLengthError: for a length that the states do not allow, with the number of the sequence.
-        ValueError: for sequences that no model can learn from, and for one theta alone.
-    """
-    check_demonstrations(recorded, floor)
-    for index, sequence in enumerate(resampled):
-        try:
-            check_length(len(sequence), *states)
-        except SequenceLengthError as error:
-            raise SequenceLengthError(f"sequence {index}: {error}") from error
-    if (theta == theta[0]).all():
-        raise ValueError(
-            f"theta is {theta[0].tolist()} for every sequence: nothing shows how the movement depends on it; give "
-            "sequences with different theta, or train a LeftRightHMM, which has no parameters"
-        )
+def inverse_information(information: Floats, widest: float) -> Floats:
+    """Covariance, no standard deviation above `widest`. Shape (P, P)."""
+    values, vectors = np.linalg.eigh(information)
+    values = np.maximum(values, 1.0 / widest**2)
+    return np.asarray((vectors / values) @ vectors.T)

@@ -1,4 +1,7 @@
-"""Parametric HMMs whose state means are polynomials of theta: linear, quadratic, cubic (thesis 3.3.1, 4.2.3)."""
+"""Parametric HMMs whose state means are polynomials of theta: linear, quadratic, cubic (thesis 3.3.1, 4.2.3).
+
+And what they have in common with others whose covariances do not depend on theta.
+"""
 
 from __future__ import annotations
 
@@ -9,21 +12,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents import Floats
+from paramove.documents import Floats, Ints
 from paramove.hmm import (
     Evaluator,
     LeftRightHMM,
     Parameters,
     TrainingOptions,
+    TrainingSummary,
     equal_segments,
 )
 from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.estimates import ParameterEstimate
-from paramove.phmm.examining import ExaminingPHMM, Residuals, inverse_information
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise
-from paramove.phmm.parametric import TrainingData
+from paramove.phmm.parametric import ParametricHMM, Residuals, TrainingData, inverse_information
 from paramove.phmm.performance import state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
 from paramove.phmm.ridge import smoothed
@@ -35,7 +38,78 @@ STEP_TOLERANCE = 1e-5
 """Predicted gain in nats below which the search ends."""
 
 
-class PolynomialPHMM(ExaminingPHMM):
+class ConstantCovariancePHMM(ParametricHMM):
+    """Only the state means depend on theta, by monomials among others; covariances and durations do not.
+
+    Attributes:
+        monomials_: the Monomials.
+        covariances_: shape (N, D, D).
+        durations_: p_i(d) in column d - 1, shape (N, d_max).
+    """
+
+    durations_: Floats
+    _evaluator: Evaluator | None = None
+
+    def at(self, theta: ArrayLike) -> LeftRightHMM:
+        """The HMM for theta (P,)."""
+        parameters = Parameters(self.state_means(theta), self.covariances_, self.durations_, self.d_min_)
+        return LeftRightHMM.from_parameters(parameters, self.options)
+
+    def _regressed(
+        self, data: TrainingData, monomials: Monomials, options: TrainingOptions, smoothness: float | None
+    ) -> tuple[RegressedParameters, TrainingSummary]:
+        """Trained with polynomial means, from equal segments."""
+        begin = equal_segments(data.sequences, self.n_states, self.d_min_, self.d_max_, options)
+        coefficients = np.zeros((*begin.means.shape, len(monomials)))
+        coefficients[..., 0] = begin.means
+        initial = RegressedParameters(coefficients, begin.covariances, begin.durations, self.d_min_)
+        features = monomials.at(data.theta)
+        return train_regressed(initial, data.sequences, features, monomials.degrees, options, smoothness)
+
+    def _set_states(self, monomials: Monomials, covariances: Floats, durations: Floats) -> None:
+        self.monomials_ = monomials
+        # Contiguous, as after reading a file: sums in another order differ in the last bits.
+        self.covariances_, self.durations_ = np.ascontiguousarray(covariances), np.ascontiguousarray(durations)
+        self._evaluator = None
+
+    def _expect(self, noise: AddedNoise) -> None:
+        super()._expect(noise)
+        self._evaluator = None
+
+    def _scaled(self, theta: Floats) -> Floats:
+        result: Floats = (theta - self.monomials_.centre) / self.monomials_.scale
+        return result
+
+    def _movement(self, sequence: Floats, coefficients: Floats, exponents: Ints) -> search_kernels.Movement:
+        """Input of the kernels except theta, for means with coefficients (N, D, F) of monomials (F, P)."""
+        if self._evaluator is None:  # everything but the means
+            self._evaluator = Evaluator.of(self.at(self.monomials_.centre).parameters)
+        evaluator = self._evaluator
+        ends, white = evaluator.ends(len(sequence)), np.ascontiguousarray(evaluator.whitening @ coefficients)
+        frames, rows = search_kernels.whitened_frames(np.ascontiguousarray(sequence.T), evaluator.whitening, ends)
+        return search_kernels.Movement(
+            frames, rows, white, exponents, evaluator.log_norm, evaluator.log_duration, self.d_min_, ends
+        )
+
+    def _arrays(self) -> dict[str, Floats]:
+        return {
+            "covariances": self.covariances_,
+            "durations": self.durations_,
+            "theta_centre": self.monomials_.centre,
+            "theta_scale": self.monomials_.scale,
+            **self._performance_arrays(),
+        }
+
+    @staticmethod
+    def _read_monomials(arrays: dict[str, Floats], degree: int) -> Monomials:
+        centre, scale = arrays["theta_centre"], arrays["theta_scale"]
+        if centre.ndim != 1 or scale.shape != centre.shape or not (scale > 0).all():
+            raise ValueError(f"expected theta_scale above 0 as long as theta_centre, found {scale.shape}: {scale}")
+        spanned = Monomials.of_degree(degree, np.stack([centre - scale, centre + scale]))
+        return Monomials(spanned.exponents, centre, scale)
+
+
+class PolynomialPHMM(ConstantCovariancePHMM):
     """Means mu_i = Z_i phi(theta) with all monomials of theta up to a degree; covariances do not depend on theta.
 
     Args:
@@ -88,23 +162,17 @@ class PolynomialPHMM(ExaminingPHMM):
                 f"coefficients of degree {self.degree} in {data.theta.shape[1]} parameters: give more different theta, "
                 "a lower degree, or a smoothness (a prior)"
             )
-        begin = equal_segments(data.sequences, self.n_states, self.d_min_, self.d_max_, options)
-        coefficients = np.zeros((*begin.means.shape, len(monomials)))
-        coefficients[..., 0] = begin.means
-        initial = RegressedParameters(coefficients, begin.covariances, begin.durations, self.d_min_)
-        features = monomials.at(data.theta)
-        trained, self.training_ = train_regressed(
-            initial, data.sequences, features, monomials.degrees, options, self.smoothness
-        )
+        trained, self.training_ = self._regressed(data, monomials, options, self.smoothness)
         performances = self._fitted_performances(data, monomials)
         if performances is not None and self.smoothness is not None:
-            averages = self._state_averages(data, trained, monomials)
-            known = stretched(self.description, coefficients.shape, monomials)
+            averages, features = self._state_averages(data, trained, monomials), monomials.at(data.theta)
+            known = stretched(self.description, trained.coefficients.shape, monomials)
             explained = np.einsum("ndf,kf->knd", known, features).reshape(averages.shape)
             smooth = smoothed(features, monomials.degrees, averages - explained, data.groups)
-            coefficients = known + smooth.reshape(coefficients.shape)
+            coefficients = known + smooth.reshape(known.shape)
             trained = with_coefficients(trained, coefficients, data.sequences, features, options)
-        self._set_learned(monomials, trained)
+        self._set_states(monomials, trained.covariances, trained.durations)
+        self.coefficients_ = np.ascontiguousarray(trained.coefficients)
         self.performances_ = performances
 
     def _state_averages(self, data: TrainingData, trained: RegressedParameters, monomials: Monomials) -> Floats:
@@ -116,110 +184,46 @@ class PolynomialPHMM(ExaminingPHMM):
             averages.append(state_averages(own.expectation(sequence)[1].T, sequence).ravel())
         return np.stack(averages)
 
-    def _set_learned(self, monomials: Monomials, learned: RegressedParameters) -> None:
-        self.monomials_ = monomials
-        # Contiguous, as after reading a file: sums in another order differ in the last bits.
-        self.coefficients_ = np.ascontiguousarray(learned.coefficients)
-        self.covariances_ = np.ascontiguousarray(learned.covariances)
-        self.durations_ = np.ascontiguousarray(learned.durations)
-        self._white: tuple[Evaluator, Floats] | None = None
-
-    def at(self, theta: ArrayLike) -> LeftRightHMM:
-        """The HMM for theta (P,)."""
-        parameters = Parameters(self.state_means(theta), self.covariances_, self.durations_, self.d_min_)
-        return LeftRightHMM.from_parameters(parameters, self.options)
-
     def state_means(self, theta: ArrayLike) -> Floats:
         """Means of all states for one theta (P,) or many (M, P) (3.1). Shape (N, D) or (M, N, D)."""
         features = self.monomials_.at(self._checked_theta(theta))
         result: Floats = np.einsum("ndf,...f->...nd", self.coefficients_, features)
         return result
 
-    def log_likelihood_and_gradient(self, sequence: ArrayLike, theta: ArrayLike) -> tuple[float, Floats]:
-        """ln p(X | lambda^theta) and its derivative with respect to theta (P,), exact."""
-        u = (self._checked_theta(theta) - self.monomials_.centre) / self.monomials_.scale
-        value, gradient, _ = search_kernels.expectation_at(u, self._prepared(self._checked(sequence)))
-        return float(value), gradient / self.monomials_.scale
-
     def _most_likely(self, recorded: Floats) -> ParameterEstimate:
         """The maximum of the likelihood, by EM (3.5), generalised where means are not linear."""
-        prepared = self._prepared(self._checked(recorded))
-        best, value, gradient = self._likeliest(prepared)
-        information = search_kernels.information_at(best, gradient, prepared)
-        scale = self.monomials_.scale
-        covariance = inverse_information(information, self._widest) * np.outer(scale, scale)
-        return ParameterEstimate(self.monomials_.centre + scale * best, covariance, value)
-
-    def _log_likelihood_at(self, checked: Floats, theta: Floats) -> float:
-        position = (theta - self.monomials_.centre) / self.monomials_.scale
-        return float(search_kernels.log_likelihood_at(position, self._prepared(checked)))
-
-    def _expect(self, noise: AddedNoise) -> None:
-        super()._expect(noise)
-        self._white = None
-
-    def _move_means(self, change: Floats) -> None:
-        self.coefficients_ = self.coefficients_ + change
-        self._white = None
-
-    @property
-    def _widest(self) -> float:
-        return 1.0 + 2.0 * self.search_margin
-
-    def _likeliest(self, prepared: search_kernels.Movement) -> tuple[Floats, float, Floats]:
-        """Scaled theta with the largest likelihood, its logarithm, and the gradient there."""
-        bounds = np.full(len(self.monomials_.centre), self._widest)
+        prepared = self._prepared(self._resampled_for_states(recorded))
+        widest, scale = 1.0 + 2.0 * self.search_margin, self.monomials_.scale
+        bounds = np.full(len(scale), widest)
         best, value, gradient = search_kernels.best_climbed(
             self.monomials_.starts, -bounds, bounds, MAX_STEPS, STEP_TOLERANCE, prepared
         )
-        return best, float(value), gradient
+        information = search_kernels.information_at(best, gradient, prepared)
+        covariance = inverse_information(information, widest) * np.outer(scale, scale)
+        return ParameterEstimate(self.monomials_.centre + scale * best, covariance, float(value))
+
+    def _log_likelihood_at(self, resampled: Floats, theta: Floats) -> float:
+        return float(search_kernels.log_likelihood_at(self._scaled(theta), self._prepared(resampled)))
+
+    def _move_means(self, change: Floats) -> None:
+        self.coefficients_ = self.coefficients_ + change
 
     def _prepared(self, sequence: Floats) -> search_kernels.Movement:
-        """Input of the kernels except theta."""
-        evaluator, white = self._whitened()
-        ends = evaluator.ends(len(sequence))
-        frames, rows = search_kernels.whitened_frames(np.ascontiguousarray(sequence.T), evaluator.whitening, ends)
-        return search_kernels.Movement(
-            frames,
-            rows,
-            white,
-            self.monomials_.exponents,
-            evaluator.log_norm,
-            evaluator.log_duration,
-            self.d_min_,
-            ends,
-        )
-
-    def _whitened(self) -> tuple[Evaluator, Floats]:
-        """Everything that depends neither on a sequence nor on theta: an evaluator, and the whitened coefficients."""
-        if self._white is None:
-            evaluator = Evaluator.of(self.at(self.monomials_.centre).parameters)
-            self._white = evaluator, np.ascontiguousarray(evaluator.whitening @ self.coefficients_)
-        return self._white
+        return self._movement(sequence, self.coefficients_, self.monomials_.exponents)
 
     @classmethod
     def _parameter_names(cls) -> list[str]:
         return [name for name in inspect.signature(PolynomialPHMM.__init__).parameters if name != "self"]
 
     def _arrays(self) -> dict[str, Floats]:
-        arrays = {
-            "coefficients": self.coefficients_,
-            "covariances": self.covariances_,
-            "durations": self.durations_,
-            "theta_centre": self.monomials_.centre,
-            "theta_scale": self.monomials_.scale,
-        }
-        return arrays | self._performance_arrays()
+        return {"coefficients": self.coefficients_, **super()._arrays()}
 
     def _set_arrays(self, arrays: dict[str, Floats]) -> None:
-        centre, scale = arrays["theta_centre"], arrays["theta_scale"]
-        monomials = Monomials.of_degree(self.degree, np.stack([centre - scale, centre + scale]))
-        monomials = Monomials(monomials.exponents, centre, scale)
-        dim = arrays["coefficients"].shape[1]
-        check_shapes(arrays, {"coefficients": (self.n_states, dim, len(monomials)), "theta_scale": centre.shape})
-        check_states(arrays, arrays["coefficients"][..., 0], self.d_min_, self.d_max_)
-        learned = (arrays["coefficients"], arrays["covariances"], arrays["durations"])
-        self._set_learned(monomials, RegressedParameters(*learned, self.d_min_))
+        monomials, self.coefficients_ = self._read_monomials(arrays, self.degree), arrays["coefficients"]
+        dim = self.coefficients_.shape[1]
+        check_shapes(arrays, {"coefficients": (self.n_states, dim, len(monomials))})
+        check_states(arrays, self.coefficients_[..., 0], self.d_min_, self.d_max_)
+        self._set_states(monomials, arrays["covariances"], arrays["durations"])
         self._set_performances(arrays)
 
 

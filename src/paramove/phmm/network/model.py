@@ -8,23 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
-from paramove.hmm import (
-    Evaluator,
-    LeftRightHMM,
-    Parameters,
-    TrainingOptions,
-    equal_segments,
-)
+from paramove.hmm import TrainingOptions
 from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
-from paramove.phmm.examining import ExaminingPHMM
 from paramove.phmm.features import Monomials
 from paramove.phmm.network.choice import chosen_units, with_decay
 from paramove.phmm.network.networks import StateNetworks
 from paramove.phmm.network.training import NetworkParameters, NetworkPrior, SequenceMoments, train_networks
-from paramove.phmm.noise import AddedNoise
 from paramove.phmm.parametric import TrainingData
-from paramove.phmm.regression import RegressedParameters, train_regressed
+from paramove.phmm.polynomial import ConstantCovariancePHMM
 from paramove.phmm.ridge import chosen_ridge
 from paramove.phmm.storage import check_states
 
@@ -32,7 +24,7 @@ SMOOTHNESS = 0.05
 """Of the polynomial model whose alignment of frames and states the networks begin with."""
 
 
-class NeuralPHMM(ExaminingPHMM):
+class NeuralPHMM(ConstantCovariancePHMM):
     """Means mu_i = Z_i phi(theta) + W2_i sigma(W1_i theta + b1_i); covariances do not depend on theta.
 
     The polynomial Z_i phi(theta), added to the network of (3.5), models the nearly linear part; the network learns the
@@ -87,14 +79,10 @@ class NeuralPHMM(ExaminingPHMM):
             )
         options = self._training_options()
         monomials = Monomials.of_degree(self.skip_degree, data.theta)
-        aligned = self._aligned(data, options, monomials)
+        aligned, _ = self._regressed(data, monomials, options, SMOOTHNESS)
         positions, features = (data.theta - monomials.centre) / monomials.scale, monomials.at(data.theta)
-        begin = NetworkParameters(
-            StateNetworks(np.zeros((0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0))),
-            aligned.covariances, aligned.durations, self.d_min_,
-        )  # fmt: skip
         means = np.einsum("ndf,kf->knd", aligned.coefficients, features)
-        moments = SequenceMoments.gathered(begin, data.sequences, means)
+        moments = SequenceMoments.gathered(aligned.at(features[0]), data.sequences, means)
         metric = moments.squared.sum(axis=0) / moments.weights.sum()
         metric = metric + 1e-6 * np.trace(metric) / len(metric) * np.eye(len(metric))
         frames = float(moments.weights.sum(axis=0).mean())
@@ -110,34 +98,19 @@ class NeuralPHMM(ExaminingPHMM):
         trained, self.training_ = train_networks(
             begin, prior, data.sequences, positions, features, options, self.gradient_steps
         )
-        self._set_learned(monomials, trained.networks, trained.covariances, trained.durations)
-        units = replace(monomials, units=trained.networks.inner[-1])  # of the last state, where theta shows most
-        self.performances_ = self._fitted_performances(data, units)
+        self._set_states(monomials, trained.covariances, trained.durations)
+        self._set_networks(trained.networks)
+        self.performances_ = self._fitted_performances(data, self._features())
 
-    def _aligned(self, data: TrainingData, options: TrainingOptions, monomials: Monomials) -> RegressedParameters:
-        """A polynomial model that aligns frames and states."""
-        begin = equal_segments(data.sequences, self.n_states, self.d_min_, self.d_max_, options)
-        coefficients = np.zeros((*begin.means.shape, len(monomials)))
-        coefficients[..., 0] = begin.means
-        initial = RegressedParameters(coefficients, begin.covariances, begin.durations, self.d_min_)
-        features = monomials.at(data.theta)
-        return train_regressed(initial, data.sequences, features, monomials.degrees, options, SMOOTHNESS)[0]
-
-    def _set_learned(
-        self, monomials: Monomials, networks: StateNetworks, covariances: Floats, durations: Floats
-    ) -> None:
-        self.monomials_ = monomials
+    def _set_networks(self, networks: StateNetworks) -> None:
         # Contiguous, as after reading a file: sums in another order differ in the last bits.
         arrays = (np.ascontiguousarray(one) for one in (networks.skip, networks.outer, networks.inner))
         self.networks_ = StateNetworks(*arrays)
         self.n_hidden_ = networks.inner.shape[1]
-        self.covariances_, self.durations_ = np.ascontiguousarray(covariances), np.ascontiguousarray(durations)
-        self._evaluator: Evaluator | None = None
 
-    def at(self, theta: ArrayLike) -> LeftRightHMM:
-        """The HMM for theta (P,)."""
-        parameters = Parameters(self.state_means(theta), self.covariances_, self.durations_, self.d_min_)
-        return LeftRightHMM.from_parameters(parameters, self.options)
+    def _features(self) -> Monomials:
+        """Those of whole executions: with the hidden units of the last state, where theta shows most."""
+        return replace(self.monomials_, units=self.networks_.inner[-1])
 
     def state_means(self, theta: ArrayLike) -> Floats:
         """Means of all states for one theta (P,) or many (M, P) (3.5). Shape (N, D) or (M, N, D)."""
@@ -147,95 +120,24 @@ class NeuralPHMM(ExaminingPHMM):
         result: Floats = means[0] if values.ndim == 1 else means
         return result
 
-    def log_likelihood_and_gradient(self, sequence: ArrayLike, theta: ArrayLike) -> tuple[float, Floats]:
-        """ln p(X | lambda^theta) and its derivative with respect to theta (P,), exact."""
-        checked = self._checked(sequence)
-        value, gradient, _ = self._expectation(self._scaled(self._checked_theta(theta)), self._prepared(checked))
-        return value, gradient / self.monomials_.scale
-
-    def _log_likelihood_at(self, checked: Floats, theta: Floats) -> float:
-        return self._value(self._scaled(theta), self._prepared(checked))
-
-    def _expect(self, noise: AddedNoise) -> None:
-        super()._expect(noise)
-        self._evaluator = None
+    def _log_likelihood_at(self, resampled: Floats, theta: Floats) -> float:
+        position = self._scaled(theta)
+        features = self.monomials_.at(self.monomials_.centre + self.monomials_.scale * position)
+        means = self.networks_.means(position[None], features[None])[0]
+        constant = np.zeros((1, len(position)), np.int64)
+        return float(search_kernels.log_likelihood_at(position, self._movement(resampled, means[..., None], constant)))
 
     def _move_means(self, change: Floats) -> None:
         self.networks_ = replace(self.networks_, skip=self.networks_.skip + change)
-        self._evaluator = None
-
-    def _expectation(self, position: Floats, prepared: search_kernels.Movement) -> tuple[float, Floats, Floats]:
-        """ln p, its gradient and the information of the means in scaled theta, at one position.
-
-        At one position the means and their slopes are those of a linear model, and so are value and derivatives.
-        """
-        means, slopes = self._means_and_slopes(position)
-        linear = np.concatenate([(means - slopes @ position)[..., None], slopes], axis=2)
-        exponents = np.concatenate([np.zeros((1, len(position)), np.int64), np.eye(len(position), dtype=np.int64)])
-        own = prepared._replace(white=np.ascontiguousarray(prepared.white @ linear), exponents=exponents)
-        value, gradient, information = search_kernels.expectation_at(position, own)
-        return float(value), gradient, information
-
-    def _value(self, position: Floats, prepared: search_kernels.Movement) -> float:
-        means = self.networks_.means(position[None], self._features(position)[None])[0]
-        own = prepared._replace(
-            white=np.ascontiguousarray(prepared.white @ means[..., None]),
-            exponents=np.zeros((1, len(position)), np.int64),
-        )
-        return float(search_kernels.log_likelihood_at(position, own))
-
-    def _means_and_slopes(self, position: Floats) -> tuple[Floats, Floats]:
-        means = self.networks_.means(position[None], self._features(position)[None])[0]
-        return means, self.networks_.slopes(position, self._jacobian(position))
-
-    def _jacobian(self, position: Floats) -> Floats:
-        """Slopes of the monomials in scaled theta. Shape (F, P)."""
-        theta = self.monomials_.centre + self.monomials_.scale * position
-        return self.monomials_.jacobian(theta) * self.monomials_.scale
-
-    def _features(self, position: Floats) -> Floats:
-        return self.monomials_.at(self.monomials_.centre + self.monomials_.scale * position)
-
-    def _prepared(self, sequence: Floats) -> search_kernels.Movement:
-        """Input of the kernels except theta; `white` holds the whitening, exponents are empty."""
-        evaluator = self._common()
-        ends = evaluator.ends(len(sequence))
-        frames, rows = search_kernels.whitened_frames(np.ascontiguousarray(sequence.T), evaluator.whitening, ends)
-        none = np.zeros((0, 0), np.int64)
-        return search_kernels.Movement(
-            frames, rows, evaluator.whitening, none, evaluator.log_norm, evaluator.log_duration, self.d_min_, ends
-        )
-
-    def _common(self) -> Evaluator:
-        """Everything but the means."""
-        if self._evaluator is None:
-            self._evaluator = Evaluator.of(self.at(self.monomials_.centre).parameters)
-        return self._evaluator
-
-    def _scaled(self, theta: Floats) -> Floats:
-        result: Floats = (theta - self.monomials_.centre) / self.monomials_.scale
-        return result
 
     def _arrays(self) -> dict[str, Floats]:
-        return {
-            "skip": self.networks_.skip,
-            "outer": self.networks_.outer,
-            "inner": self.networks_.inner,
-            "covariances": self.covariances_,
-            "durations": self.durations_,
-            "theta_centre": self.monomials_.centre,
-            "theta_scale": self.monomials_.scale,
-            **self._performance_arrays(),
-        }
+        networks = {"skip": self.networks_.skip, "outer": self.networks_.outer, "inner": self.networks_.inner}
+        return networks | super()._arrays()
 
     def _set_arrays(self, arrays: dict[str, Floats]) -> None:
-        centre, scale = arrays["theta_centre"], arrays["theta_scale"]
-        if centre.ndim != 1 or scale.shape != centre.shape or not (scale > 0).all():
-            raise ValueError(f"expected theta_scale above 0 as long as theta_centre, found {scale.shape}: {scale}")
-        spanned = Monomials.of_degree(self.skip_degree, np.stack([centre - scale, centre + scale]))
-        monomials = Monomials(spanned.exponents, centre, scale)
-        networks = StateNetworks.from_arrays(arrays, self.n_states, len(monomials), len(centre))
+        monomials = self._read_monomials(arrays, self.skip_degree)
+        networks = StateNetworks.from_arrays(arrays, self.n_states, len(monomials), len(monomials.centre))
         check_states(arrays, networks.skip[..., 0], self.d_min_, self.d_max_)
-        self._set_learned(monomials, networks, arrays["covariances"], arrays["durations"])
-        units = replace(monomials, units=networks.inner[-1])
-        self._set_performances(arrays, units)
+        self._set_states(monomials, arrays["covariances"], arrays["durations"])
+        self._set_networks(networks)
+        self._set_performances(arrays, self._features())

@@ -49,13 +49,6 @@ class StateNetworks:
         result += np.einsum("ndh,mnh->mnd", self.outer, hidden)
         return result
 
-    def slopes(self, position: Floats, jacobian: Floats) -> Floats:
-        """Derivatives of the means at a scaled theta (P,), given those of the monomials (F, P). Shape (N, D, P)."""
-        hidden = hidden_units(self.inner, position[None])[0]
-        bent = (hidden * (1.0 - hidden))[:, :, None] * self.inner[:, :, :-1]
-        result: Floats = self.skip @ jacobian + self.outer @ bent
-        return result
-
 
 @dataclass(frozen=True)
 class StateTargets:

@@ -64,9 +64,9 @@ class SequenceMoments:
     log_likelihood: float
 
     @classmethod
-    def gathered(cls, parameters: NetworkParameters, sequences: Sequence[Floats], means: Floats) -> SequenceMoments:
-        """E-step with the means (K, N, D) of the sequences."""
-        common = Evaluator.of(parameters.with_means(means[0]))
+    def gathered(cls, parameters: Parameters, sequences: Sequence[Floats], means: Floats) -> SequenceMoments:
+        """E-step with the means (K, N, D) of the sequences, and the covariances and durations of the parameters."""
+        common = Evaluator.of(parameters)
         weights, firsts = np.zeros(means.shape[:2]), np.zeros(means.shape)
         squared, durations = np.zeros_like(parameters.covariances), np.zeros_like(parameters.durations)
         log_likelihood = 0.0
@@ -144,12 +144,13 @@ def train_networks(
     scale = root_mean_deviation(sequences)
     parameters, target = initial, None
     for _ in range(options.max_iterations):
-        moments = SequenceMoments.gathered(parameters, sequences, parameters.networks.means(positions, features))
+        means = parameters.networks.means(positions, features)
+        moments = SequenceMoments.gathered(parameters.with_means(means[0]), sequences, means)
         if target is None:
-            target = pooled_covariance(moments.scatter(moments.means), moments.weights.sum(axis=0))
+            target = pooled_covariance(moments.scatter(means), moments.weights.sum(axis=0))
         regularisation = regularisation_at(AFTER_ANNEALING, options, scale, target)
         objective = moments.log_likelihood + prior.log_density(parameters.networks)
-        objective += penalty(parameters.with_means(moments.means[0]), regularisation)
+        objective += penalty(parameters.with_means(means[0]), regularisation)
         monitor.add(moments.log_likelihood, objective)
         if monitor.converged:
             break
