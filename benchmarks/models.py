@@ -171,12 +171,10 @@ def parametric() -> list[Row]:
     quadratic = QuadraticPHMM(n_states=20, d_min=4, d_max=6, resampled_frames=100).fit(
         training.sequences, training.theta
     )
-    theta, tau = np.repeat(training.theta[:1], 400, axis=0), np.linspace(0.0, 1.0, 400)
     return [
         Row("train interpolative PHMM, 80 states", lambda: local.fit(training.sequences, training.theta)),
         Row("estimate theta, interpolative, 80 states", lambda: local.estimate(training.sequences[0])),
         Row("estimate theta, quadratic, 20 states", lambda: quadratic.estimate(training.sequences[0])),
-        Row("mean at a progress, 400 particles", lambda: local.progress_mean(theta, tau)),
     ]
 
 

@@ -166,14 +166,6 @@ class InterpolativePHMM(ParametricHMM):
         means = np.einsum("mc,mcnd->mnd", weights, self.means_[indices])
         return cast(Floats, means[0] if coordinates.ndim == 1 else means)
 
-    def progress_mean(self, theta: ArrayLike, tau: float | Floats) -> Floats:
-        """Mean pose at progress tau (6.2). Shape (D,); for many theta (M, P) and tau (M,): (M, D)."""
-        return self._at_progress(self.means_, theta, tau, clamped=False)
-
-    def progress_covariance(self, theta: ArrayLike, tau: float | Floats) -> Floats:
-        """Covariance of the pose at progress tau (6.3). Shape (D, D); for many theta and tau: (M, D, D)."""
-        return self._at_progress(self.covariances_, theta, tau, clamped=True)
-
     def _most_likely(self, recorded: Floats) -> ParameterEstimate:
         """The maximum of the likelihood (thesis 3.4.4); its covariance is the inverse information: far too small.
 
@@ -235,23 +227,6 @@ class InterpolativePHMM(ParametricHMM):
         covariances = np.tensordot(weights[0], self.covariances_[indices[0]], axes=1)
         durations = np.tensordot(weights[0], self.durations_[indices[0]], axes=1)
         return Parameters(means, covariances, durations, self.d_min_)
-
-    def _at_progress(self, values: Floats, theta: ArrayLike, tau: float | Floats, clamped: bool) -> Floats:
-        coordinates = self._coordinates(theta)
-        progress = np.asarray(tau, dtype=np.float64)
-        if not ((progress >= 0.0) & (progress <= 1.0)).all():
-            raise ValueError(f"progress lies in [0, 1], found {progress.min():.3g} to {progress.max():.3g}")
-        rows, progress = np.atleast_2d(coordinates), np.atleast_1d(progress)
-        n_rows = max(len(rows), len(progress))
-        rows, progress = np.broadcast_to(rows, (n_rows, rows.shape[1])), np.broadcast_to(progress, n_rows)
-        position = progress * (self.n_states - 1)
-        lower, upper = np.floor(position).astype(np.int64), np.ceil(position).astype(np.int64)
-        indices, weights = self.grid_.weights(rows, clamped)
-        fraction = (position - lower)[:, None]
-        result = np.einsum("mc,mc...->m...", weights * (1.0 - fraction), values[indices, lower[:, None]])
-        result += np.einsum("mc,mc...->m...", weights * fraction, values[indices, upper[:, None]])
-        single = coordinates.ndim == 1 and np.ndim(tau) == 0
-        return cast(Floats, result[0] if single else result)
 
     def _arrays(self) -> dict[str, Floats]:
         knots = {f"knots_{number}": line for number, line in enumerate(self.grid_.knots)}

@@ -370,23 +370,9 @@ class ParametricHMM(ABC):
         frames = np.maximum(2, np.round(np.exp(logarithms))).astype(np.int64)
         return frames if frames.ndim else int(frames)
 
-    def progress_mean(self, theta: ArrayLike, tau: float | Floats) -> Floats:
-        """Mean pose at progress tau in [0, 1] (6.2). Shape (D,); for many theta (M, P) and tau (M,): (M, D)."""
-        parameters = np.asarray(theta, dtype=np.float64)
-        if parameters.ndim == 1:
-            return at_progress(self.state_means(parameters), tau)
-        progress = np.broadcast_to(np.asarray(tau, dtype=np.float64), len(parameters))
-        return np.stack([self.progress_mean(one, float(at)) for one, at in zip(parameters, progress, strict=True)])
-
     def progress_covariance(self, theta: ArrayLike, tau: float | Floats) -> Floats:
-        """Covariance of the pose at progress tau (6.3). Shape (D, D); for many theta and tau: (M, D, D)."""
-        parameters = np.asarray(theta, dtype=np.float64)
-        if parameters.ndim == 1:
-            return at_progress(self.at(parameters).covariances_, tau)
-        progress = np.broadcast_to(np.asarray(tau, dtype=np.float64), len(parameters))
-        return np.stack(
-            [self.progress_covariance(one, float(at)) for one, at in zip(parameters, progress, strict=True)]
-        )
+        """Covariance of the pose for theta (P,) at progress tau in [0, 1] (6.3). Shape tau.shape + (D, D)."""
+        return at_progress(self.at(theta).covariances_, tau)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """Constructor arguments, as scikit-learn expects."""
