@@ -17,46 +17,24 @@ import numpy as np
 from paramove.demonstrations import FRAME, FRAMES, Action, last_parts
 from paramove.documents import Floats
 from paramove.hmm import TrainingOptions
-from paramove.phmm import MovementDescription, QuadraticPHMM, cached_model
+from paramove.phmm import Examination, MovementDescription, QuadraticPHMM, cached_model
 
 STATES = 8
 PERSONS = 8
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """The result of comparing a window of points with the model.
-
-    Attributes:
-        theta: coordinates (u, v) on the table of the position that is pointed at, (2,). covariance: of theta, (2, 2).
-        outlier_score: how far it is from the last part of a pointing movement.
-        p_value: probability that a genuine one has at least this outlier score.
-        log_density: of the window as pointing.
-    """
-
-    theta: Floats
-    covariance: Floats
-    outlier_score: float
-    p_value: float
-    log_density: float
-
-
 class LastPartModel:
     """The last part of pointing, and of reaching where the two can be distinguished.
 
-    Args:
-        pointing: of points over `FRAMES` frames, with correlated residuals.
-        reaching: the same for reaching; None where it does not compete.
-
     Attributes:
-        duration_s: mean of the demonstrated last parts of pointing.
+        pointing: of points over `FRAMES` frames (FRAMES, 3 n), m, in the demonstrator's frame, with correlated
+            residuals; theta are the coordinates (u, v) on the table of the position that is pointed at.
+        reaching: the same for reaching; None where it does not compete.
     """
 
-    def __init__(self, pointing: QuadraticPHMM, reaching: QuadraticPHMM | None) -> None:
-        assert pointing.description is not None
-        self._pointing = pointing
-        self._reaching = reaching
-        self.duration_s = float(pointing.description.duration)
+    pointing: QuadraticPHMM
+    reaching: QuadraticPHMM | None
 
     @classmethod
     def of_points(cls, points: Sequence[str], folder: Path | None = None) -> LastPartModel:
@@ -69,17 +47,15 @@ class LastPartModel:
         both = {"wrist", "index"} <= set(points)
         return cls(pointing, _trained("reaching", points, folder) if both else None)
 
-    def judged(self, window: Floats) -> Judgement:
-        """Judges points over time (FRAMES, 3 n), m, in the models' frame."""
-        examined = self._pointing.examine(window)
-        estimate = examined.estimate
-        return Judgement(
-            estimate.theta, estimate.covariance, examined.outlier_score, examined.p_value, examined.log_density
-        )
+    @property
+    def duration_s(self) -> float:
+        """Mean of the demonstrated last parts of pointing."""
+        assert self.pointing.description is not None
+        return float(self.pointing.description.duration)
 
-    def lead(self, window: Floats, judged: Judgement) -> float:
+    def lead(self, window: Floats, examined: Examination) -> float:
         """Logarithm of a window's density as pointing over that as reaching; infinite if reaching does not compete."""
-        return np.inf if self._reaching is None else judged.log_density - self._reaching.examine(window).log_density
+        return np.inf if self.reaching is None else examined.log_density - self.reaching.examine(window).log_density
 
 
 def _trained(action: Action, points: Sequence[str], folder: Path | None) -> QuadraticPHMM:

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import ConfigDict
 
 from paramove.bus import Topic, topics
 from paramove.documents import OldNames
 from paramove.pointing.events import PointingEventOptions, PointingEvents
-from paramove.pointing.window import PointingWindowOptions
-
-if TYPE_CHECKING:
-    from paramove.pointing.window import PointingWindow
+from paramove.pointing.window import PointingWindow, PointingWindowOptions
 
 
 class PointingSetup(OldNames):
@@ -43,38 +40,31 @@ class PointingSetup(OldNames):
     def pointing_source(self, run_folder: Path = Path()) -> PointingSource:
         """Reads the person's measures; trains a model at its first use. Raises InputError."""
         if self.pointing_from == "estimates":
-            return PointingSource(PointingEvents(self.pointing_actions))
-        return PointingSource(self._window(run_folder))
-
-    def _window(self, run_folder: Path) -> PointingWindow:
+            return PointingSource(topics.ACTION_ESTIMATE, PointingEvents(self.pointing_actions))
         # Movement models take a second to import: import them only for poses.
         from paramove.action_space import measured_person
         from paramove.pointing.last_part_model import LastPartModel
-        from paramove.pointing.window import PointingWindow
 
         person = measured_person(run_folder, self.person)
         model = LastPartModel.of_points(self.pointing_window.points)
-        return PointingWindow(model, person.placement, self.pointing_window)
+        window = PointingWindow(model, person.placement, self.pointing_window)
+        return PointingSource(topics.HUMAN_ARM_POSE, window)
 
 
 class PointingSource:
-    """Turns the messages of one topic into gestures, and poses into a ball where they point.
+    """Turns the messages of one topic into gestures, and poses into a ball where they point."""
 
-    Attributes:
-        topic: The subscribed topic.
-    """
-
-    def __init__(self, gestures: PointingEvents | PointingWindow) -> None:
+    def __init__(self, topic: Topic, gestures: PointingEvents | PointingWindow) -> None:
+        self._topic = topic
         self._gestures = gestures
-        self.topic = topics.ACTION_ESTIMATE if isinstance(gestures, PointingEvents) else topics.HUMAN_ARM_POSE
 
     def handle(self, topic: Topic, message: Any) -> Iterator[tuple[Topic, Any]]:
         """The messages that follow from a message; none for other topics than the subscribed one."""
-        if topic.name != self.topic.name:
+        if topic.name != self._topic.name:
             return
         gesture = self._gestures.update(message)
         if gesture is not None:
             yield topics.GESTURES, gesture
-        ball = None if isinstance(self._gestures, PointingEvents) else self._gestures.ball()
+        ball = self._gestures.ball() if isinstance(self._gestures, PointingWindow) else None
         if ball is not None:
             yield topics.GESTURES_SCENE, ball

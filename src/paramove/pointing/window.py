@@ -24,7 +24,8 @@ from paramove.msgs.gesture_pb2 import Gesture
 from paramove.pointing.events import FARTHEST_M
 
 if TYPE_CHECKING:
-    from paramove.pointing.last_part_model import Judgement, LastPartModel
+    from paramove.phmm import Examination
+    from paramove.pointing.last_part_model import LastPartModel
 
 LENGTHS = (0.6, 0.75, 0.95, 1.2, 1.5)
 """Of the windows that are tried, over the mean duration of the demonstrated last parts."""
@@ -40,14 +41,14 @@ class WindowEstimate:
 
     Attributes:
         captured_ns: of its last sample.
-        judgement: of the window that fits pointing best.
+        examination: of the window that fits pointing best, as pointing.
         position: the target of that window, (3,), m, in the world. deviation: along each axis, (3,), m.
         hand: the last of the points at its end, (3,), m, in the world.
         pointing: whether it counts as pointing.
     """
 
     captured_ns: int
-    judgement: Judgement
+    examination: Examination
     position: Floats
     deviation: Floats
     hand: Floats
@@ -56,7 +57,7 @@ class WindowEstimate:
     @property
     def likeness(self) -> float:
         """From 0 (no pointing) to 1 (typical pointing)."""
-        return float(self.judgement.p_value**0.25) if self.pointing else 0.0
+        return float(self.examination.p_value**0.25) if self.pointing else 0.0
 
 
 class PointingWindow:
@@ -147,22 +148,22 @@ class PointingWindow:
         samples = np.array(self._samples)
         placed = self._placement.in_model(samples)
         windows = [at_times(np.linspace(-length, 0.0, FRAMES), times, placed) for length in lengths]
-        judged = [self._model.judged(window) for window in windows]
-        chosen = int(np.argmin([one.outlier_score for one in judged]))
-        best = judged[chosen]
-        position = self._placement.in_world(table_place(best.theta))
+        examined = [self._model.pointing.examine(window) for window in windows]
+        chosen = int(np.argmin([one.outlier_score for one in examined]))
+        best = examined[chosen]
+        position = self._placement.in_world(table_place(best.estimate.theta))
         slopes = (table_place(np.eye(2)) - table_place(np.zeros(2))) * self._placement.scale
-        deviation = np.sqrt(np.einsum("pi,pq,qi->i", slopes, best.covariance, slopes))
+        deviation = np.sqrt(np.einsum("pi,pq,qi->i", slopes, best.estimate.covariance, slopes))
         return WindowEstimate(
             now_ns, best, position, deviation, samples[-1, -3:], self._is_pointing(windows[chosen], best)
         )
 
-    def _is_pointing(self, window: Floats, judged: Judgement) -> bool:
-        options = self._options
-        outside = np.maximum(-judged.theta, judged.theta - 1.0).max()
-        if judged.p_value < options.level or outside > options.margin:
+    def _is_pointing(self, window: Floats, examined: Examination) -> bool:
+        options, theta = self._options, examined.estimate.theta
+        outside = np.maximum(-theta, theta - 1.0).max()
+        if examined.p_value < options.level or outside > options.margin:
             return False
-        return self._model.lead(window, judged) >= options.min_lead
+        return self._model.lead(window, examined) >= options.min_lead
 
     def _completed(self, now_ns: int, hand: Floats) -> Gesture | None:
         """The gesture of the best window, once the pointing is over; one until the hand moves away."""
@@ -171,8 +172,8 @@ class PointingWindow:
                 return None
             self._reported_at = None
         estimate, best = self.estimate, self._best
-        minimum = np.inf if best is None else best.judgement.outlier_score
-        if estimate is not None and estimate.pointing and estimate.judgement.outlier_score < minimum:
+        minimum = np.inf if best is None else best.examination.outlier_score
+        if estimate is not None and estimate.pointing and estimate.examination.outlier_score < minimum:
             self._best = best = estimate
         if best is None or now_ns - best.captured_ns < self._options.settled_s * 1e9:
             return None
