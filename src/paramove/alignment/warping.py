@@ -169,15 +169,13 @@ def warp(first: ArrayLike, second: ArrayLike, pattern: StepPattern = "A") -> Ali
     return Alignment(path[:, 0], path[:, 1], float(total[-1, -1]))
 
 
-def movement_distance(
-    first: ArrayLike, second: ArrayLike, *, n_points: int = 7, cut: float = 0.15, pattern: StepPattern = "A"
-) -> float:
+def movement_distance(first: ArrayLike, second: ArrayLike, *, n_points: int = 7, cut: float = 0.15) -> float:
     """Root mean square distance of body points after warping, without the fraction `cut` at both ends (4.3), in m.
 
     Corrected: divided by the actual number of terms.
     """
     p, q = checked_sequence(first), checked_sequence(second)
-    alignment = warp(p, q, pattern)
+    alignment = warp(p, q)
     length = len(alignment.first)
     middle = slice(int(np.floor(cut * length)), int(np.ceil((1.0 - cut) * length)))
     difference = p[alignment.first[middle]] - q[alignment.second[middle]]

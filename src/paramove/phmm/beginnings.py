@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.special import softmax
 
 from paramove.documents import Floats, Ints
@@ -164,9 +163,9 @@ def check_beginning(n_frames: int, minimum: int) -> None:
         raise ValueError(f"a beginning has at least {minimum} frames, found {n_frames}: wait for more of the movement")
 
 
-def points_of(sequence: ArrayLike, increments: bool) -> Floats:
+def points_of(sequence: Floats, increments: bool) -> Floats:
     """Six points of a beginning at equal times, or the first and the increments between them. Shape (6 D,)."""
-    result: Floats = described(resample(np.asarray(sequence, dtype=np.float64), POINTS)[None], increments)[0]
+    result: Floats = described(resample(sequence, POINTS)[None], increments)[0]
     return result
 
 

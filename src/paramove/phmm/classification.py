@@ -117,19 +117,19 @@ class MovementClassifier:
         self._check_trained()
         checked = checked_sequence(sequence)
         results = {action: _result(model, checked, finished) for action, model in self.models_.items()}
-        p_values = {action: p_value for action, (_, _, p_value) in results.items()}
         if self._discriminants or not finished:
             discriminant = discriminant_for(self._discriminants, len(checked), finished)
             log_posterior = discriminant.log_probabilities(checked)
-            p_values = {a: discriminant.p_value(checked, n) for n, a in enumerate(self.classes_)} | p_values
-        else:
+        else:  # every action has a model
             scores = np.array([score for _, score, _ in results.values()])
             log_posterior = scores - logsumexp(scores)
-        best = self.classes_[int(log_posterior.argmax())]
+        number = int(log_posterior.argmax())
+        best = self.classes_[number]
         if best in self.models_:
             self.models_[best]._warn(checked, finished)
+        p_value = results[best][2] if best in results else discriminant.p_value(checked, number)
         posterior = {action: float(np.exp(value)) for action, value in zip(self.classes_, log_posterior, strict=True)}
-        return Classification(best, posterior, {action: one for action, (one, _, _) in results.items()}, p_values[best])
+        return Classification(best, posterior, {action: one for action, (one, _, _) in results.items()}, p_value)
 
     def predict(self, sequences: Sequence[ArrayLike], *, finished: bool = True) -> NDArray[np.str_]:
         """The most probable action of each sequence."""

@@ -12,14 +12,52 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
-from paramove.phmm.performance import PARTS
+from paramove.hmm import interpolate
+from paramove.phmm.correlated_regression import CorrelatedRegression
+from paramove.phmm.performance import OUTLIER_SHRINKAGE, PARTS
 
+FOLLOWED = 0.9
+"""Fraction of the correlations of executions that conditions follow."""
+START = 0.05
+"""Conditions up to this fraction of a movement are conditions on its start."""
 TIMES = (*((np.arange(PARTS) + 0.5) / PARTS).tolist(), 1.0)
 """Fractions of a movement at which deviations are known: middles of the parts, and the end."""
 EXACT = 1e-9
 """Variance of a condition, relative to that of the movement there."""
+
+
+def passing(mean: Floats, via: Mapping[float, ArrayLike], executions: CorrelatedRegression) -> Floats:
+    """The most likely movement (n, D) that passes poses `via`, see `ParametricHMM.synthesize_through`.
+
+    Args:
+        mean: the movement without conditions, (n, D).
+        via: poses (D,) by fractions of the movement.
+        executions: how whole executions vary, `Performances.complete`.
+
+    Raises ValueError for poses and fractions that do not fit.
+    """
+    missed: dict[float, Floats] = {}
+    for progress, pose in via.items():
+        wanted = np.asarray(pose, dtype=np.float64)
+        if wanted.shape != mean.shape[1:] or np.isinf(wanted).any() or not 0.0 <= progress <= 1.0:
+            raise ValueError(
+                f"via has poses of {mean.shape[1]} numbers by fractions from 0 to 1, found shape {wanted.shape} at "
+                f"{progress}"
+            )
+        missed[progress] = wanted - interpolate(mean, np.array([progress * (len(mean) - 1)]))[0]
+    if not missed:
+        return mean
+    if min(missed) > START:
+        missed[0.0] = np.zeros(mean.shape[1])
+    covariance = executions.root @ executions.root.T
+    diagonal = np.diag(np.diagonal(covariance))
+    # Detection of outliers takes half of the correlations for chance; synthesis follows nearly all of them.
+    followed = diagonal + FOLLOWED / (1.0 - OUTLIER_SHRINKAGE) * (covariance - diagonal)
+    result: Floats = mean + deviation(missed, followed, len(mean))
+    return result
 
 
 def deviation(missed_at: Mapping[float, Floats], covariance: Floats, n_samples: int) -> Floats:

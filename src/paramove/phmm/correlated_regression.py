@@ -270,7 +270,7 @@ class CondensedRegressions:
         own, bound = self.monomials, 1.0 + 2.0 * margin
         condensed = (self.projectors @ y[..., None])[..., 0]
         positions, slopes = all_nearest(
-            own.starts, bound, own.exponents, own.logistic, condensed, self.triangles, NEWTON_STEPS
+            own.starts, bound, own.exponents, own.units, condensed, self.triangles, NEWTON_STEPS
         )
         nearest: Floats = own.centre + own.scale * positions
         phi, squares = own.at(nearest), np.diag(own.scale**2)

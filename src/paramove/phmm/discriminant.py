@@ -9,7 +9,7 @@ actions instead of the distances from them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -150,17 +150,13 @@ class Discriminant:
 def discriminants(sequences: Sequence[Floats], actions: Ints, n_actions: int, groups: Ints) -> tuple[Discriminant, ...]:
     """Of complete movements, and of beginnings of every number of frames of a geometric grid, up to the lengths."""
     lengths = np.array([len(sequence) for sequence in sequences])
-
-    def fitted() -> Iterator[Discriminant]:
-        yield Discriminant.fitted(sequences, actions, n_actions, groups, WHOLE)
-        n_frames = float(FIRST_FRAMES)
-        while round(n_frames) <= np.quantile(lengths, 0.95):
-            long = np.flatnonzero(lengths >= round(n_frames))
-            own = [sequences[k] for k in long.tolist()]
-            yield Discriminant.fitted(own, actions[long], n_actions, groups[long], round(n_frames))
-            n_frames *= GROWTH
-
-    return tuple(fitted())
+    result, n_frames = [Discriminant.fitted(sequences, actions, n_actions, groups, WHOLE)], float(FIRST_FRAMES)
+    while round(n_frames) <= np.quantile(lengths, 0.95):
+        long = np.flatnonzero(lengths >= round(n_frames))
+        own = [sequences[k] for k in long.tolist()]
+        result.append(Discriminant.fitted(own, actions[long], n_actions, groups[long], round(n_frames)))
+        n_frames *= GROWTH
+    return tuple(result)
 
 
 def discriminant_for(every: Sequence[Discriminant], n_frames: int, finished: bool) -> Discriminant:

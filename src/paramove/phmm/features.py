@@ -26,13 +26,13 @@ class Monomials:
     Attributes:
         exponents: power of each component of u in each monomial, the constant first, then by degree. Shape (F, P).
         centre, scale: of theta, shape (P,), in the unit of theta.
-        units: W1 and, last, b1 of logistic units of u (3.5) after the monomials, (H, P + 1); None: there are none.
+        units: W1 and, last, b1 of logistic units of u (3.5) after the monomials, often none, (H, P + 1).
     """
 
     exponents: Ints
     centre: Floats
     scale: Floats
-    units: Floats | None = None
+    units: Floats
 
     @classmethod
     def of_degree(cls, degree: int, theta: Floats) -> Monomials:
@@ -52,18 +52,14 @@ class Monomials:
                 f"found degree {degree} of {len(each)} parameters"
             )
         factors = (f for total in range(degree + 1) for f in itertools.combinations_with_replacement(each, total))
-        return cls(np.array([[one.count(p) for p in each] for one in factors]), 0.5 * (lower + upper), scale)
+        exponents = np.array([[one.count(p) for p in each] for one in factors])
+        return cls(exponents, 0.5 * (lower + upper), scale, np.zeros((0, len(each) + 1)))
 
     @property
     def degrees(self) -> Ints:
         """Degree of each monomial; of logistic units one more than the largest. Shape (F + H,)."""
         degrees: Ints = self.exponents.sum(axis=1)
-        return np.concatenate([degrees, np.full(len(self.logistic), degrees.max() + 1)])
-
-    @cached_property
-    def logistic(self) -> Floats:
-        """`units`, empty if there are none."""
-        return self.units if self.units is not None else np.zeros((0, len(self.centre) + 1))
+        return np.concatenate([degrees, np.full(len(self.units), degrees.max() + 1)])
 
     @cached_property
     def starts(self) -> Floats:
@@ -72,7 +68,7 @@ class Monomials:
         With logistic units a grid, finer where theta has few components.
         """
         middle = np.zeros((1, len(self.centre)))
-        if len(self.logistic):
+        if len(self.units):
             n_lines = max(2, int(MAX_STARTS ** (1.0 / len(self.centre)) + 1e-9))
             line = np.linspace(-1.0, 1.0, 2 * n_lines + 1)[1::2]
             return np.concatenate([middle, list(itertools.product(line, repeat=len(self.centre)))])
@@ -81,20 +77,20 @@ class Monomials:
         return np.concatenate([middle, list(itertools.product((-0.5, 0.5), repeat=len(self.centre)))])
 
     def __len__(self) -> int:
-        return len(self.exponents) + len(self.logistic)
+        return len(self.exponents) + len(self.units)
 
     def at(self, theta: ArrayLike) -> Floats:
         """Values for theta (..., P). Shape (..., F + H)."""
         u = (np.asarray(theta, dtype=np.float64) - self.centre) / self.scale
         result: Floats = np.prod(u[..., None, :] ** self.exponents, axis=-1)
-        if self.units is None:
+        if not len(self.units):
             return result
         return np.concatenate([result, expit(u @ self.units[:, :-1].T + self.units[:, -1])], axis=-1)
 
     def jacobian(self, theta: ArrayLike) -> Floats:
         """Derivatives with respect to theta (P,) or many (K, P). Shape (F + H, P) or (K, F + H, P)."""
         u = (np.asarray(theta, dtype=np.float64) - self.centre) / self.scale
-        slopes = slopes_at(np.atleast_2d(u), self.exponents, self.logistic) / self.scale
+        slopes = slopes_at(np.atleast_2d(u), self.exponents, self.units) / self.scale
         result: Floats = slopes[0] if u.ndim == 1 else slopes
         return result
 

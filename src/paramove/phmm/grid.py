@@ -48,12 +48,8 @@ class ParameterGrid:
             if line.ndim != 1 or len(line) < 2 or not (np.diff(line) > 0).all():
                 raise ValueError(f"dimension {number} needs at least two increasing values, found {line.tolist()}")
         spans = np.array([line[-1] - line[0] for line in values])
-        knots = []
-        for line, span in zip(values, spans, strict=True):
-            scaled = (line - line[0]) / span
-            scaled[-1] = 1.0
-            knots.append(scaled)
-        return cls(np.array([line[0] for line in values]), np.diag(spans), tuple(knots))
+        knots = tuple((line - line[0]) / span for line, span in zip(values, spans, strict=True))
+        return cls(np.array([line[0] for line in values]), np.diag(spans), knots)
 
     @classmethod
     def from_corners(cls, corners: ArrayLike, shape: Sequence[int]) -> Self:

@@ -36,7 +36,6 @@ SEARCH_TOLERANCE = 1e-7
 """Relative change of the log-likelihood at which the search within a region ends."""
 CONTRADICTED = 1e10
 """Minus the log-likelihood, for the search, where the durations contradict the sequence."""
-AFTER_ANNEALING = 10**6
 
 
 def synchronised(
@@ -65,7 +64,7 @@ def _refined(
     weights = [one.weight for one in gathered]
     # Broadcast over states: the target of state i is the mean of state i over the groups.
     target = np.sum(scatters, axis=0) / np.sum(weights, axis=0)[:, None, None]
-    regularisation = regularisation_at(AFTER_ANNEALING, options, scale, target)
+    regularisation = regularisation_at(options.annealing_iterations, options, scale, target)  # it is over
     return [
         Parameters(
             mean,
@@ -128,7 +127,10 @@ class InterpolativePHMM(ParametricHMM):
         self.search_margin = search_margin
 
     def _fit(self, data: TrainingData) -> None:
-        grid = self._grid_for(data.theta)
+        if self.corners is None:
+            grid = ParameterGrid.from_theta(data.theta)
+        else:
+            grid = ParameterGrid.from_corners(self.corners, self.shape or (2,) * data.theta.shape[1])
         groups = grouped(data.sequences, data.theta, grid)
         options = self._training_options()
         everything = LeftRightHMM(self.n_states, self.d_min_, self.d_max_, options=options).fit(data.sequences)
@@ -140,28 +142,26 @@ class InterpolativePHMM(ParametricHMM):
         self.durations_ = np.stack([one.durations for one in local])
         self.performances_ = self._fitted_performances(data)
 
-    def _grid_for(self, theta: Floats) -> ParameterGrid:
-        if self.corners is None:
-            return ParameterGrid.from_theta(theta)
-        return ParameterGrid.from_corners(self.corners, self.shape or (2,) * theta.shape[1])
-
     def _set_grid(self, grid: ParameterGrid) -> None:
         """Executions depend on theta by a quadratic polynomial, or a cubic one if the grid has as many lines."""
         self.grid_, self._prepared = grid, None
         self.monomials_ = Monomials.of_degree(3 if max(grid.shape) > 3 else 2, grid.points())
 
-    def _coordinates(self, theta: ArrayLike) -> Floats:
-        values = self._checked_theta(theta)  # raises if the model is not trained
-        return self.grid_.coordinates(values)
-
     def at(self, theta: ArrayLike) -> LeftRightHMM:
         """The interpolated HMM for theta (P,)."""
-        parameters = self._interpolated(self._coordinates(theta))
-        return LeftRightHMM.from_parameters(parameters, self.options)
+        values = self._checked_theta(theta)  # raises if the model is not trained
+        coordinates = self.grid_.coordinates(values)[None, :]
+        indices, weights = self.grid_.weights(coordinates, clamped=False)
+        means = np.tensordot(weights[0], self.means_[indices[0]], axes=1)
+        indices, weights = self.grid_.weights(coordinates, clamped=True)
+        covariances = np.tensordot(weights[0], self.covariances_[indices[0]], axes=1)
+        durations = np.tensordot(weights[0], self.durations_[indices[0]], axes=1)
+        return LeftRightHMM.from_parameters(Parameters(means, covariances, durations, self.d_min_), self.options)
 
     def state_means(self, theta: ArrayLike) -> Floats:
         """Means of all states for one theta (P,) or many (M, P) (5.2)-(5.4, corrected). Shape (N, D) or (M, N, D)."""
-        coordinates = self._coordinates(theta)
+        values = self._checked_theta(theta)  # raises if the model is not trained
+        coordinates = self.grid_.coordinates(values)
         indices, weights = self.grid_.weights(np.atleast_2d(coordinates), clamped=False)
         means = np.einsum("mc,mcnd->mnd", weights, self.means_[indices])
         return cast(Floats, means[0] if coordinates.ndim == 1 else means)
@@ -220,14 +220,6 @@ class InterpolativePHMM(ParametricHMM):
             self._prepared = knots, np.array(grid.shape, dtype=np.int64), means, flat, durations, self.d_min_
         return self._prepared
 
-    def _interpolated(self, coordinates: Floats) -> Parameters:
-        indices, weights = self.grid_.weights(coordinates[None, :], clamped=False)
-        means = np.tensordot(weights[0], self.means_[indices[0]], axes=1)
-        indices, weights = self.grid_.weights(coordinates[None, :], clamped=True)
-        covariances = np.tensordot(weights[0], self.covariances_[indices[0]], axes=1)
-        durations = np.tensordot(weights[0], self.durations_[indices[0]], axes=1)
-        return Parameters(means, covariances, durations, self.d_min_)
-
     def _arrays(self) -> dict[str, Floats]:
         knots = {f"knots_{number}": line for number, line in enumerate(self.grid_.knots)}
         grid = {"grid_origin": self.grid_.origin, "grid_edges": self.grid_.edges, **knots}
@@ -261,9 +253,7 @@ def grouped(sequences: list[Floats], theta: Floats, grid: ParameterGrid) -> list
             f"{int((distance > 0.1).sum())} sequences are not at a grid point; sequence {worst} has theta "
             f"{np.round(theta[worst], 4).tolist()}, its nearest point is {nearest}"
         )
-    groups: list[list[Floats]] = [[] for _ in range(grid.size)]
-    for number, sequence in zip(index, sequences, strict=True):
-        groups[number].append(sequence)
+    groups = [[sequences[k] for k in np.flatnonzero(index == number)] for number in range(grid.size)]
     empty = [np.round(grid.points()[number], 4).tolist() for number, group in enumerate(groups) if not group]
     if empty:
         raise ValueError(f"no training sequences at {len(empty)} of {grid.size} points of the grid: {empty}; {REMEDY}")

@@ -33,19 +33,18 @@ from paramove.hmm import (
     check_length,
     checked_sequence,
     checked_sequences,
-    interpolate,
     minimum_jerk,
     not_fitted,
     resample,
 )
 from paramove.hmm import Path as PathKind
 from paramove.phmm.adaptation import Adaptation
-from paramove.phmm.conditioning import deviation
+from paramove.phmm.conditioning import passing
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.estimates import Examination, ParameterEstimate
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, NoiseLevel
-from paramove.phmm.performance import OUTLIER_SHRINKAGE, Performances, groups_of, movement_parts, state_averages
+from paramove.phmm.performance import Performances, groups_of, movement_parts, state_averages
 from paramove.phmm.plausibility import TrainingRange, UnlikelyMovementWarning
 from paramove.phmm.ridge import smoothed
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
@@ -54,10 +53,6 @@ MAX_FRAMES = 100_000
 DEFAULT_FRAMES, STATE_MARGIN = 100, 0.2
 Residuals = Literal["independent", "correlated"]
 INDEPENDENT = "this model has independent residuals: train it with residuals='correlated'"
-FOLLOWED = 0.9
-"""Fraction of the correlations of executions that conditions follow."""
-START = 0.05
-"""Conditions up to this fraction of a movement are conditions on its start."""
 
 
 @dataclass(frozen=True)
@@ -325,22 +320,10 @@ class ParametricHMM(ABC):
         Raises ValueError for poses and fractions that do not fit, and for independent residuals, which know no
         executions.
         """
-        mean, covariance = self.synthesize(theta, n_samples), self._covariance_of_executions()
-        missed: dict[float, Floats] = {}
-        for progress, pose in via.items():
-            wanted = np.asarray(pose, dtype=np.float64)
-            if wanted.shape != mean.shape[1:] or np.isinf(wanted).any() or not 0.0 <= progress <= 1.0:
-                raise ValueError(
-                    f"via has poses of {mean.shape[1]} numbers by fractions from 0 to 1, found shape {wanted.shape} at "
-                    f"{progress}"
-                )
-            missed[progress] = wanted - interpolate(mean, np.array([progress * (n_samples - 1)]))[0]
-        if not missed:
-            return mean
-        if min(missed) > START:
-            missed[0.0] = np.zeros(mean.shape[1])
-        result: Floats = mean + deviation(missed, covariance, n_samples)
-        return result
+        mean = self.synthesize(theta, n_samples)
+        if self.performances_ is None:
+            raise ValueError(INDEPENDENT)
+        return passing(mean, via, self.performances_.complete)
 
     def redirect(self, movement: ArrayLike, theta: ArrayLike, at: float, within: float = 0.3) -> Floats:
         """A movement (n, D) that from a fraction `at` of it on turns to another theta (P,). Shape (n, D).
@@ -512,16 +495,6 @@ class ParametricHMM(ABC):
     def _dimension(self) -> int:
         self._check_trained()
         return int(self.covariances_.shape[-1])
-
-    def _covariance_of_executions(self) -> Floats:
-        if self.performances_ is None:
-            raise ValueError(INDEPENDENT)
-        regression = self.performances_.complete
-        covariance = regression.root @ regression.root.T
-        diagonal = np.diag(np.diagonal(covariance))
-        # Detection of outliers takes half of the correlations for chance; synthesis follows nearly all of them.
-        result: Floats = diagonal + FOLLOWED / (1.0 - OUTLIER_SHRINKAGE) * (covariance - diagonal)
-        return result
 
     def _fitted_performances(self, data: TrainingData, features: Monomials | None = None) -> Performances | None:
         """Distribution of whole executions with these features of theta; None with independent residuals."""

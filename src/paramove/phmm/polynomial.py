@@ -106,7 +106,7 @@ class ConstantCovariancePHMM(ParametricHMM):
         if centre.ndim != 1 or scale.shape != centre.shape or not (scale > 0).all():
             raise ValueError(f"expected theta_scale above 0 as long as theta_centre, found {scale.shape}: {scale}")
         spanned = Monomials.of_degree(degree, np.stack([centre - scale, centre + scale]))
-        return Monomials(spanned.exponents, centre, scale)
+        return replace(spanned, centre=centre, scale=scale)
 
 
 class PolynomialPHMM(ConstantCovariancePHMM):

@@ -234,7 +234,7 @@ class SlopePrior:
     Attributes:
         coupling: I + l^4 D'D, shape (N, N).
         strength: lambda of each monomial, 0 for the constant, shape (F,).
-        whitening: makes the pooled covariance the identity, shape (D, D).
+        whitening: inverse Cholesky factor of the pooled covariance, shape (D, D).
         frames: how many frames count as one observation; neighbouring frames are redundant.
     """
 
@@ -250,7 +250,7 @@ class SlopePrior:
         second = np.diff(np.eye(n_states), n=2, axis=0) if n_states > 2 else np.zeros((0, n_states))
         coupling = np.eye(n_states) + length**4 * second.T @ second
         strength = np.where(degrees > 0, 1e-3, 0.0)
-        return cls(coupling, strength, whitening_of(pooled), frames)
+        return cls(coupling, strength, np.asarray(np.linalg.inv(np.linalg.cholesky(pooled))), frames)
 
     def log_density(self, coefficients: Floats) -> float:
         """Logarithm of the prior at coefficients (N, D, F), up to a constant; times the frames of an observation."""
@@ -330,8 +330,3 @@ class SlopePrior:
         each = np.arange(n_monomials)
         total[:, each, :, each] += (self.strength * self.frames)[:, None, None] * self.coupling[None]
         return total.reshape(n_states * n_monomials, -1)
-
-
-def whitening_of(covariance: Floats) -> Floats:
-    """Inverse Cholesky factor of a covariance (D, D)."""
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))

@@ -120,7 +120,9 @@ def _rescaled(
     return residuals, float(len(y) - (1.0 - np.clip(left / minimum, 0.0, 1.0)).sum())
 
 
-def chosen_ridge(y: Floats, features: Floats, degrees: Ints, groups: Ints, relative: bool = True) -> tuple[float, ...]:
+def chosen_ridge(
+    y: Floats, features: Floats, degrees: Ints, groups: Ints, variance: float = 0.0, relative: bool = True
+) -> tuple[float, ...]:
     """The ridge per degree, as a fraction of the number of movements, that predicts left-out groups best.
 
     Relative errors weight a fingertip that is a millimetre off at the target like one that is a centimetre off before,
@@ -128,16 +130,13 @@ def chosen_ridge(y: Floats, features: Floats, degrees: Ints, groups: Ints, relat
     square error, averaged over movements, so that one unusual person does not decide.
 
     One degree after the other, until none changes; a higher degree is never regularised less than a lower one.
+    `variance` is that of `GroupOffsets`.
     """
-    return _best_ridge(y, features, degrees, GroupOffsets(groups, 0.0), relative)
-
-
-def _best_ridge(y: Floats, features: Floats, degrees: Ints, offsets: GroupOffsets, relative: bool) -> tuple[float, ...]:
-    """`chosen_ridge` with these offsets."""
     ridge = tuple(float(STRENGTHS[min(3 + 2 * degree, len(STRENGTHS) - 1)]) for degree in range(int(degrees.max())))
-    if len(np.unique(offsets.groups)) < 3:
+    if len(np.unique(groups)) < 3:
         return ridge
     known: dict[tuple[float, ...], float] = {}
+    offsets = GroupOffsets(groups, variance)
     white = offsets.whitened(y), offsets.whitened(features)
 
     def error(candidate: tuple[float, ...]) -> float:
@@ -180,7 +179,7 @@ def _chosen_offsets(y: Floats, features: Floats, degrees: Ints, groups: Ints) ->
         return candidates[0], chosen_ridge(y, features, degrees, groups)
     if y.shape[1] > len(y):  # a projection to as many numbers as movements has the same sums of squares
         y = np.asarray(np.linalg.qr(y.T, mode="r"), dtype=np.float64).T
-    ridges = [_best_ridge(y, features, degrees, one, relative=False) for one in candidates]
+    ridges = [chosen_ridge(y, features, degrees, groups, variance, relative=False) for variance in OFFSETS]
     errors = np.empty((len(candidates), len(members)))
     for i, (offsets, ridge) in enumerate(zip(candidates, ridges, strict=True)):
         white = offsets.whitened(y), offsets.whitened(features)

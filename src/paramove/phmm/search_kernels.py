@@ -110,18 +110,11 @@ def log_likelihood_at(u: Floats, movement: Movement) -> float:
 
 
 @compiled
-def _responsibilities(features: Floats, movement: Movement) -> tuple[float, Floats, Floats]:
-    """ln p with these monomials, gamma_i(t) (N, T), zero where that is -inf, and whitened means (N, D)."""
+def _aligned(features: Floats, movement: Movement) -> tuple[float, Floats, Floats, Floats]:
+    """ln p with these monomials, how many frames each state has (N,), the sum of these (N, D), and the means (N, D)."""
     out, means = log_outputs_at(features, movement)
     gamma, counts = np.zeros(out.shape), np.zeros(movement.log_duration.shape)
     value = stacked_segments(out, np.array([0, out.shape[1]]), movement.log_duration, movement.d_min, gamma, counts)[0]
-    return value, gamma, means
-
-
-@compiled
-def _aligned(features: Floats, movement: Movement) -> tuple[float, Floats, Floats, Floats]:
-    """ln p with these monomials, how many frames each state has (N,), the sum of these (N, D), and the means (N, D)."""
-    value, gamma, means = _responsibilities(features, movement)
     occupancy, sums = np.zeros(len(means)), np.zeros(means.shape)
     if value > -np.inf:
         for i in range(len(means)):

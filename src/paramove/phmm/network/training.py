@@ -25,8 +25,6 @@ from paramove.hmm import (
 )
 from paramove.phmm.network.networks import INNER_DEVIATION, StateNetworks, StateTargets
 
-AFTER_ANNEALING = 10**6
-
 
 @dataclass(frozen=True)
 class NetworkParameters:
@@ -148,7 +146,7 @@ def train_networks(
         moments = SequenceMoments.gathered(parameters.with_means(means[0]), sequences, means)
         if target is None:
             target = pooled_covariance(moments.scatter(means), moments.weights.sum(axis=0))
-        regularisation = regularisation_at(AFTER_ANNEALING, options, scale, target)
+        regularisation = regularisation_at(options.annealing_iterations, options, scale, target)  # it is over
         objective = moments.log_likelihood + prior.log_density(parameters.networks)
         objective += penalty(parameters.with_means(means[0]), regularisation)
         monitor.add(moments.log_likelihood, objective)
