@@ -193,7 +193,7 @@ def test_the_noise_of_the_training_is_kept_in_files(
     with np.load(file, allow_pickle=False) as stored:
         arrays = {name: stored[name] for name in stored.files}
     np.savez(file, **{**arrays, "learned_training_noise": -np.ones(2)})
-    with pytest.raises(ModelFileError, match="expected two variances in training_noise"):
+    with pytest.raises(ModelFileError, match="expected 2 numbers from 0 on in training_noise"):
         ParametricHMM.load(file)
     del arrays["learned_training_noise"]
     np.savez(file, **arrays)

@@ -95,7 +95,7 @@ class Beginnings:
         return replace(self, regressions=tuple(own))
 
     def examined(self, sequence: Floats, margin: float, noise: AddedNoise | None = None) -> Examination:
-        """A beginning (T, D), with noise beyond that of the training; `margin` as `CorrelatedRegression.estimates`.
+        """A beginning (T, D), with noise beyond that of the training; `margin` as `CondensedRegressions.estimates`.
 
         Raises ValueError for a beginning of fewer than 5 frames.
         """

@@ -118,27 +118,13 @@ class CorrelatedRegression:
             inflation = inflation_of([one.squares for one in tests], theta.shape[1], n_persons)
             errors = np.linalg.norm(tests[0].missed / monomials.scale, axis=1)[np.isfinite(tests[0].distances)]
             # Movements that no fold tested are compared with a covariance that includes them.
-            everywhere = regression.distances_from(y, theta)
+            everywhere = regression.condensed.distances_from(y, theta)
             distances = np.where(np.isnan(tests[-1].distances), everywhere, tests[-1].distances)
             deviation = np.sqrt((errors**2).sum() / max(1, len(errors)) / theta.shape[1])
             unseen = unseen_curvature(features, monomials.degrees, KNOWN * float(deviation))
             regression = replace(regression, inflation=inflation, distances=distances, inverse=inverse, unseen=unseen)
             results.append((regression, float(errors.mean()) if len(errors) and not few else np.inf))
         return results
-
-    def estimates(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
-        """Theta (K, P) of movements (K, n), and its calibrated covariances (K, P, P).
-
-        Theta lies outside the bounds of the training by at most `margin`, a fraction of their width.
-        """
-        return self.condensed.estimates(y, margin)[:2]
-
-    def distances_from(self, y: Floats, theta: Floats) -> Floats:
-        """Squared Mahalanobis distances of movements (K, n) from those of theta (K, P), with n ln(1 + phi' V phi). (K,)
-
-        With that, -2 ln of the density up to a constant: what theta far from the training allow is not likely for it.
-        """
-        return self.condensed.distances_from(y, theta)
 
     def adapted(self, y: Floats, theta: Floats, adaptation: Adaptation) -> CorrelatedRegression:
         """Of the person whose movements (K, n) at theta (K, P) these are."""
@@ -164,7 +150,7 @@ class CorrelatedRegression:
         )
 
     def log_density(self, distance: float) -> float:
-        """Logarithm of the density of a movement at a distance, see `distances_from`."""
+        """Logarithm of the density of a movement at a distance, see `CondensedRegressions.distances_from`."""
         diagonal = np.diagonal(self.root)
         return float(-0.5 * distance - np.log(diagonal).sum() - 0.5 * len(diagonal) * np.log(2.0 * np.pi))
 
@@ -199,8 +185,8 @@ class CorrelatedRegression:
         }
         count, size, scalars = len(own["coefficients"]), len(monomials), own["scalars"]
         expected = {"coefficients": (count, size), "uncertainty": (size, size), "unseen": (size, size)}
-        expected |= {"root": (count, count), "distances": own["groups"].shape, "groups": (len(own["distances"]),)}
-        check_shapes(arrays, expected, prefix)
+        check_shapes(arrays, expected | {"root": (count, count)}, prefix)
+        check_shapes(arrays, {"distances": own["groups"].shape, "groups": (len(own["distances"]),)}, prefix)
         if not (np.diagonal(own["root"]) > 0).all() or scalars.ndim != 1 or len(scalars) < 3 or not scalars[0] > 0:
             raise ValueError(f"expected a root with a positive diagonal and an inflation above 0 in {prefix}scalars")
         inflation, shrinkage, *ridge = (float(one) for one in scalars)
@@ -263,9 +249,10 @@ class CondensedRegressions:
         return CondensedRegressions(monomials, inverse and inverse.part(chosen), *(one[chosen] for one in others))
 
     def estimates(self, y: Floats, margin: float) -> tuple[Floats, Floats, Floats]:
-        """Of movements (K, n) theta (K, P) and its covariances (K, P, P), see `CorrelatedRegression.estimates`.
+        """Of movements (K, n) theta (K, P) and its calibrated covariances (K, P, P).
 
-        And theta that explains each movement best, (K, P), from which distances count.
+        And theta that explains each movement best, (K, P), from which distances count. Theta lies outside the bounds of
+        the training by at most `margin`, a fraction of their width.
         """
         own, bound = self.monomials, 1.0 + 2.0 * margin
         condensed = (self.projectors @ y[..., None])[..., 0]
@@ -285,7 +272,10 @@ class CondensedRegressions:
         return theta, covariances, nearest
 
     def distances_from(self, y: Floats, theta: Floats) -> Floats:
-        """Of movements (K, n) from those of theta (K, P), see `CorrelatedRegression.distances_from`. Shape (K,)."""
+        """Squared Mahalanobis distances of movements (K, n) from those of theta (K, P), with n ln(1 + phi' V phi). (K,)
+
+        With that, -2 ln of the density up to a constant: what theta far from the training allow is not likely for it.
+        """
         phi = self.monomials.at(theta)
         missed = (self.inverses @ y[..., None] - self.white @ phi[..., None])[..., 0]
         factors = variances_at(phi, self.uncertainty)
@@ -339,8 +329,8 @@ def _left_out(
     count, dimension = theta.shape
     found = LeftOut(*(np.full((count, *shape), np.nan) for shape in ((dimension,), (dimension, dimension), ())))
     for tested, fit in folds:
-        other = fit.regression(groups[tested], *chosen)
-        theta_found, found.covariances[tested] = other.estimates(y[tested], MARGIN)
+        other = fit.regression(groups[tested], *chosen).condensed
+        theta_found, found.covariances[tested], _ = other.estimates(y[tested], MARGIN)
         found.missed[tested] = theta_found - theta[tested]
         found.distances[tested] = other.distances_from(y[tested], theta_found)
     return found

@@ -137,9 +137,8 @@ class Discriminant:
     def from_arrays(cls, arrays: Mapping[str, Floats], number: int, n_actions: int) -> Self:
         """From the result of `arrays`. Raises KeyError for a missing array, ValueError for shapes that do not fit."""
         means, root, scalars, usual = (arrays[f"{name}{number}"] for name in ("means", "root", "scalars", "usual"))
-        expected = {"means": (n_actions, root.shape[-1]), "root": (means.shape[-1],) * 2}
-        expected |= {"scalars": (2 + n_actions,), "usual": (n_actions, 3)}
-        check_shapes(arrays, {f"{name}{number}": shape for name, shape in expected.items()})
+        check_shapes(arrays, {f"means{number}": (n_actions, root.shape[-1]), f"root{number}": (means.shape[-1],) * 2})
+        check_shapes(arrays, {f"scalars{number}": (2 + n_actions,), f"usual{number}": (n_actions, 3)})
         with np.errstate(divide="ignore"):
             log_priors, deviations = np.log(scalars[2:]), 1.0 / usual[:, 1]
         rows = zip(usual[:, 0].tolist(), deviations.tolist(), usual[:, 2].tolist(), strict=True)

@@ -140,7 +140,6 @@ class InterpolativePHMM(ParametricHMM):
         self.means_ = np.stack([one.means for one in local])
         self.covariances_ = np.stack([one.covariances for one in local])
         self.durations_ = np.stack([one.durations for one in local])
-        self.performances_ = self._fitted_performances(data)
 
     def _set_grid(self, grid: ParameterGrid) -> None:
         """Executions depend on theta by a quadratic polynomial, or a cubic one if the grid has as many lines."""
@@ -224,7 +223,7 @@ class InterpolativePHMM(ParametricHMM):
         knots = {f"knots_{number}": line for number, line in enumerate(self.grid_.knots)}
         grid = {"grid_origin": self.grid_.origin, "grid_edges": self.grid_.edges, **knots}
         local = {"means": self.means_, "covariances": self.covariances_, "durations": self.durations_}
-        return local | grid | self._performance_arrays()
+        return local | grid
 
     def _set_arrays(self, arrays: dict[str, Floats]) -> None:
         knots = tuple(arrays[f"knots_{number}"] for number in range(len(arrays["grid_origin"])))
@@ -235,7 +234,6 @@ class InterpolativePHMM(ParametricHMM):
         expected = {"means": (self.grid_.size, self.n_states, dim), "grid_origin": (theta_dim,)}
         check_shapes(arrays, expected | {"grid_edges": (theta_dim, theta_dim)})
         check_states(arrays, self.means_, self.d_min_, self.d_max_)
-        self._set_performances(arrays)
 
 
 def grouped(sequences: list[Floats], theta: Floats, grid: ParameterGrid) -> list[list[Floats]]:

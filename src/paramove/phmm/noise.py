@@ -72,17 +72,6 @@ class NoiseLevel:
             return None
         return AddedNoise(variance - self.usual, recorded, n_frames)
 
-    def array(self) -> Floats:
-        """For a file."""
-        return np.array([self.usual, self.maximum])
-
-    @classmethod
-    def from_array(cls, array: Floats) -> NoiseLevel:
-        """From the result of `array`. Raises ValueError for anything but two variances."""
-        if array.shape != (2,) or (array < 0.0).any():
-            raise ValueError(f"expected two variances in training_noise, found shape {array.shape}: {array}")
-        return cls(*map(float, array))
-
 
 @dataclass(frozen=True)
 class AddedNoise:

@@ -12,7 +12,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from math import ceil
 from numbers import Integral
 from pathlib import Path
@@ -47,7 +47,7 @@ from paramove.phmm.noise import AddedNoise, NoiseLevel
 from paramove.phmm.performance import Performances, groups_of, movement_parts, state_averages
 from paramove.phmm.plausibility import TrainingRange, UnlikelyMovementWarning
 from paramove.phmm.ridge import smoothed
-from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
+from paramove.phmm.storage import ModelFileError, ModelRecord, read_numbers, read_record, write_record
 
 MAX_FRAMES = 100_000
 DEFAULT_FRAMES, STATE_MARGIN = 100, 0.2
@@ -61,13 +61,11 @@ class TrainingData:
 
     Attributes:
         sequences: resampled to `resampled_frames` if the model does so, (T_k, D) each.
-        recorded: the same in their own time.
         theta: shape (K, P).
         groups: number of the group of each, shape (K,).
     """
 
     sequences: list[Floats]
-    recorded: list[Floats]
     theta: Floats
     groups: Ints
 
@@ -192,13 +190,16 @@ class ParametricHMM(ABC):
 
         Raises SequenceLengthError for impossible lengths, ValueError for labels or values that do not fit.
         """
-        self._check_counts()
+        self._check_parameters()
         recorded = checked_sequences(sequences)
         checked = [self._resampled(sequence) for sequence in recorded]
         labels = checked_theta(theta, len(checked))
         self._check_training(recorded, checked, labels)
         numbers = groups_of(groups, labels)
-        self._fit(TrainingData(checked, recorded, labels, numbers))
+        self._fit(TrainingData(checked, labels, numbers))
+        self.performances_ = None
+        if self.residuals == "correlated":
+            self.performances_ = Performances.fitted(recorded, labels, self._features_of_executions(), numbers)
         self.parameter_bounds_ = np.stack([labels.min(axis=0), labels.max(axis=0)])
         self.training_theta_ = np.unique(labels, axis=0)
         self.training_noise_ = NoiseLevel.of(recorded)
@@ -392,12 +393,14 @@ class ParametricHMM(ABC):
         """Write the trained model to one .npz file. Raises NotFittedError before training."""
         self._check_trained()
         arrays = {"parameter_bounds": np.asarray(self.parameter_bounds_), **self._arrays()}
+        if self.performances_ is not None:
+            arrays |= self.performances_.arrays()
         optional = {
             "flat_theta": np.ones(1) if self.flat_theta_ else None,
             "log_frames": self.log_frames_,
             "training_theta": self.training_theta_,
-            "training_noise": self.training_noise_ and self.training_noise_.array(),
-            "training_range": self.training_range_ and self.training_range_.array(),
+            "training_noise": None if self.training_noise_ is None else np.array(astuple(self.training_noise_)),
+            "training_range": None if self.training_range_ is None else np.array(astuple(self.training_range_)),
         }
         arrays |= {name: array for name, array in optional.items() if array is not None}
         write_record(Path(path), ModelRecord(type(self).__name__, self.get_params(), self.training_, arrays))
@@ -417,19 +420,21 @@ class ParametricHMM(ABC):
             raise ModelFileError(f"{path}: expected one of {sorted(known)}, found a {record.class_name}")
         try:
             model = known[record.class_name](**record.parameters)
-            model._check_counts()
+            model._check_parameters()
             arrays = dict(record.arrays)
-            model.parameter_bounds_ = arrays.pop("parameter_bounds")
-            model.training_theta_ = arrays.pop("training_theta", None)
-            model.flat_theta_ = arrays.pop("flat_theta", None) is not None
-            model.log_frames_ = arrays.pop("log_frames", None)
+            model.parameter_bounds_ = arrays["parameter_bounds"]
+            model.training_theta_ = arrays.get("training_theta")
+            model.flat_theta_ = "flat_theta" in arrays
+            model.log_frames_ = arrays.get("log_frames")
             if model.log_frames_ is not None and model.log_frames_.shape != (model.parameter_bounds_.shape[-1] + 1,):
                 raise ValueError(f"expected one more log_frames than parameters, found {model.log_frames_.shape}")
-            noise = arrays.pop("training_noise", None)
-            model.training_noise_ = None if noise is None else NoiseLevel.from_array(noise)
-            seen = arrays.pop("training_range", None)
-            model.training_range_ = None if seen is None else TrainingRange.from_array(seen)
+            if noise := read_numbers(arrays, "training_noise", 2):
+                model.training_noise_ = NoiseLevel(*noise)
+            if seen := read_numbers(arrays, "training_range", 4):
+                model.training_range_ = TrainingRange(*seen)
             model._set_arrays(arrays)
+            if model.residuals == "correlated":
+                model.performances_ = Performances.from_arrays(arrays, model._features_of_executions())
         except KeyError as error:
             names = ", ".join(sorted(record.arrays)) or "none"
             raise ModelFileError(f"{path}: expected an array {error}, found {names}") from error
@@ -440,7 +445,8 @@ class ParametricHMM(ABC):
 
     def _expecting_noise_of(self, recorded: Floats) -> Self:
         """This model, or if a recorded sequence has more noise than the training, one that expects this noise."""
-        noise = self.training_noise_ and self.training_noise_.added(recorded, self.resampled_frames_)
+        known = self.training_noise_
+        noise = None if known is None else known.added(recorded, self.resampled_frames_)
         if noise is None:
             return self
         model = copy(self)
@@ -478,9 +484,8 @@ class ParametricHMM(ABC):
             return self.performances_.beginnings.examined(recorded, self.search_margin, self.performances_.noise)
         estimate, parts = self._estimated(recorded, self.performances_)
         complete = self.performances_.complete
-        distance = float(
-            complete.distances_from(parts[None], complete.estimates(parts[None], self.search_margin)[0])[0]
-        )
+        theta = complete.condensed.estimates(parts[None], self.search_margin)[0]
+        distance = float(complete.condensed.distances_from(parts[None], theta)[0])
         outlier_score = self.performances_.outlier_score(distance, self.performances_.pace.distance(recorded))
         density = complete.log_density(distance)
         return Examination(estimate, outlier_score, density, self.performances_.log_p_value(outlier_score))
@@ -489,27 +494,16 @@ class ParametricHMM(ABC):
         """Estimate from the distribution of whole executions, and the description of this one."""
         resampled = self._resampled_for_states(recorded)
         parts = movement_parts(recorded)
-        (theta,), (covariance,) = performances.estimating.estimates(parts[None], self.search_margin)
+        (theta,), (covariance,), _ = performances.estimating.condensed.estimates(parts[None], self.search_margin)
         return ParameterEstimate(theta, covariance, self._log_likelihood_at(resampled, theta)), parts
 
     def _dimension(self) -> int:
         self._check_trained()
         return int(self.covariances_.shape[-1])
 
-    def _fitted_performances(self, data: TrainingData, features: Monomials | None = None) -> Performances | None:
-        """Distribution of whole executions with these features of theta; None with independent residuals."""
-        if self.residuals not in get_args(Residuals):
-            raise ValueError(f"residuals are {' or '.join(get_args(Residuals))}, found {self.residuals!r}")
-        if self.residuals == "independent":
-            return None
-        return Performances.fitted(data.recorded, data.theta, features or self.monomials_, data.groups)
-
-    def _performance_arrays(self) -> dict[str, Floats]:
-        return {} if self.performances_ is None else self.performances_.arrays()
-
-    def _set_performances(self, arrays: dict[str, Floats], features: Monomials | None = None) -> None:
-        correlated = self.residuals == "correlated"
-        self.performances_ = Performances.from_arrays(arrays, features or self.monomials_) if correlated else None
+    def _features_of_executions(self) -> Monomials:
+        """Features of theta on which whole executions depend."""
+        return self.monomials_
 
     def _warn(self, recorded: Floats, finished: bool) -> None:
         """Of what is unusual about a sequence. Raises ValueError for another unit."""
@@ -522,7 +516,9 @@ class ParametricHMM(ABC):
         if self.parameter_bounds_ is None:
             raise not_fitted("this model is not trained yet: call fit, or load a file")
 
-    def _check_counts(self) -> None:
+    def _check_parameters(self) -> None:
+        if self.residuals not in get_args(Residuals):
+            raise ValueError(f"residuals are {' or '.join(get_args(Residuals))}, found {self.residuals!r}")
         counts = {name: getattr(self, name) for name in ("n_states", "d_min_", "d_max_")}
         if not all(_whole(count) for count in counts.values()) or not 1 <= self.d_min_ <= self.d_max_:
             raise ValueError(f"expected whole numbers with 1 <= d_min <= d_max, found {counts}")

@@ -71,17 +71,6 @@ class TrainingRange:
             )
         return tuple(found)
 
-    def array(self) -> Floats:
-        """For a file."""
-        return np.array([self.largest, self.shortest, self.longest, self.fastest])
-
-    @classmethod
-    def from_array(cls, array: Floats) -> Self:
-        """From the result of `array`. Raises ValueError for anything but four numbers that are not negative."""
-        if array.shape != (4,) or (array < 0.0).any():
-            raise ValueError(f"expected four numbers in training_range, found shape {array.shape}: {array}")
-        return cls(*map(float, array))
-
 
 def peak_step(sequence: Floats) -> float:
     """Largest distance between the means of successive tenths of the time, per frame: noise of frames hardly counts."""

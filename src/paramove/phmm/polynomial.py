@@ -97,7 +97,6 @@ class ConstantCovariancePHMM(ParametricHMM):
             "durations": self.durations_,
             "theta_centre": self.monomials_.centre,
             "theta_scale": self.monomials_.scale,
-            **self._performance_arrays(),
         }
 
     @staticmethod
@@ -163,8 +162,7 @@ class PolynomialPHMM(ConstantCovariancePHMM):
                 "a lower degree, or a smoothness (a prior)"
             )
         trained, self.training_ = self._regressed(data, monomials, options, self.smoothness)
-        performances = self._fitted_performances(data, monomials)
-        if performances is not None and self.smoothness is not None:
+        if self.residuals == "correlated" and self.smoothness is not None:
             averages, features = self._state_averages(data, trained, monomials), monomials.at(data.theta)
             known = stretched(self.description, trained.coefficients.shape, monomials)
             explained = np.einsum("ndf,kf->knd", known, features).reshape(averages.shape)
@@ -173,7 +171,6 @@ class PolynomialPHMM(ConstantCovariancePHMM):
             trained = with_coefficients(trained, coefficients, data.sequences, features, options)
         self._set_states(monomials, trained.covariances, trained.durations)
         self.coefficients_ = np.ascontiguousarray(trained.coefficients)
-        self.performances_ = performances
 
     def _state_averages(self, data: TrainingData, trained: RegressedParameters, monomials: Monomials) -> Floats:
         """Mean of the frames of each movement in each state. Shape (K, N D)."""
@@ -224,7 +221,6 @@ class PolynomialPHMM(ConstantCovariancePHMM):
         check_shapes(arrays, {"coefficients": (self.n_states, dim, len(monomials))})
         check_states(arrays, self.coefficients_[..., 0], self.d_min_, self.d_max_)
         self._set_states(monomials, arrays["covariances"], arrays["durations"])
-        self._set_performances(arrays)
 
 
 class LinearPHMM(PolynomialPHMM):

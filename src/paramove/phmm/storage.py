@@ -83,6 +83,16 @@ def check_shapes(arrays: Mapping[str, Floats], expected: Mapping[str, tuple[int,
             raise ValueError(f"expected {prefix}{name} of shape {shape}, found {found}")
 
 
+def read_numbers(arrays: Mapping[str, Floats], name: str, count: int) -> list[float] | None:
+    """The numbers of an array, None if it is missing. Raises ValueError for other than `count`, and negative ones."""
+    if name not in arrays:
+        return None
+    array = arrays[name]
+    if array.shape != (count,) or (array < 0.0).any():
+        raise ValueError(f"expected {count} numbers from 0 on in {name}, found shape {array.shape}: {array}")
+    return list(map(float, array))
+
+
 def check_states(arrays: Mapping[str, Floats], means: Floats, d_min: int, d_max: int) -> None:
     """Check "covariances" (..., N, D, D) and "durations" (..., N, d_max) of HMMs with means (..., N, D).
 

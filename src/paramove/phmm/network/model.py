@@ -100,7 +100,6 @@ class NeuralPHMM(ConstantCovariancePHMM):
         )
         self._set_states(monomials, trained.covariances, trained.durations)
         self._set_networks(trained.networks)
-        self.performances_ = self._fitted_performances(data, self._features())
 
     def _set_networks(self, networks: StateNetworks) -> None:
         # Contiguous, as after reading a file: sums in another order differ in the last bits.
@@ -108,8 +107,8 @@ class NeuralPHMM(ConstantCovariancePHMM):
         self.networks_ = StateNetworks(*arrays)
         self.n_hidden_ = networks.inner.shape[1]
 
-    def _features(self) -> Monomials:
-        """Those of whole executions: with the hidden units of the last state, where theta shows most."""
+    def _features_of_executions(self) -> Monomials:
+        """With the hidden units of the last state, where theta shows most."""
         return replace(self.monomials_, units=self.networks_.inner[-1])
 
     def state_means(self, theta: ArrayLike) -> Floats:
@@ -140,4 +139,3 @@ class NeuralPHMM(ConstantCovariancePHMM):
         check_states(arrays, networks.skip[..., 0], self.d_min_, self.d_max_)
         self._set_states(monomials, arrays["covariances"], arrays["durations"])
         self._set_networks(networks)
-        self._set_performances(arrays, self._features())
