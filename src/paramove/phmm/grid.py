@@ -63,13 +63,13 @@ class ParameterGrid:
     def from_theta(cls, theta: Floats) -> Self:
         """The axis-parallel grid made of all different values of each component of theta, shape (K, P)."""
         lines = []
-        for component in theta.T:
+        for number, component in enumerate(theta.T):
             scale = max(float(np.ptp(component)), 1e-12)
             values = np.unique(np.round(component / scale, 6))
-            lines.append([float(component[np.argmin(np.abs(component / scale - value))]) for value in values])
-        for number, line in enumerate(lines):
+            line = [float(component[np.argmin(np.abs(component / scale - value))]) for value in values]
             if len(line) < 2:
                 raise ValueError(f"component {number} of theta is {line[0]} for every sequence: nothing to interpolate")
+            lines.append(line)
         return cls.from_lines(*lines)
 
     @property

@@ -48,7 +48,8 @@ class ConstantCovariancePHMM(ParametricHMM):
     """
 
     durations_: Floats
-    _evaluator: Evaluator | None = None
+    _evaluator: Evaluator | None = None  # of everything but the means
+    _white: Floats | None = None  # whitened coefficients, if they are those of all theta
 
     def at(self, theta: ArrayLike) -> LeftRightHMM:
         """The HMM for theta (P,)."""
@@ -70,22 +71,28 @@ class ConstantCovariancePHMM(ParametricHMM):
         self.monomials_ = monomials
         # Contiguous, as after reading a file: sums in another order differ in the last bits.
         self.covariances_, self.durations_ = np.ascontiguousarray(covariances), np.ascontiguousarray(durations)
-        self._evaluator = None
+        self._evaluator = self._white = None
 
     def _expect(self, noise: AddedNoise) -> None:
         super()._expect(noise)
-        self._evaluator = None
+        self._evaluator = self._white = None
 
     def _scaled(self, theta: Floats) -> Floats:
         result: Floats = (theta - self.monomials_.centre) / self.monomials_.scale
         return result
 
-    def _movement(self, sequence: Floats, coefficients: Floats, exponents: Ints) -> search_kernels.Movement:
-        """Input of the kernels except theta, for means with coefficients (N, D, F) of monomials (F, P)."""
-        if self._evaluator is None:  # everything but the means
+    def _whitened(self, coefficients: Floats) -> Floats:
+        return np.ascontiguousarray(self._common().whitening @ coefficients)
+
+    def _common(self) -> Evaluator:
+        if self._evaluator is None:
             self._evaluator = Evaluator.of(self.at(self.monomials_.centre).parameters)
-        evaluator = self._evaluator
-        ends, white = evaluator.ends(len(sequence)), np.ascontiguousarray(evaluator.whitening @ coefficients)
+        return self._evaluator
+
+    def _movement(self, sequence: Floats, white: Floats, exponents: Ints) -> search_kernels.Movement:
+        """Input of the kernels except theta, for means with whitened coefficients (N, D, F) of monomials (F, P)."""
+        evaluator = self._common()
+        ends = evaluator.ends(len(sequence))
         frames, rows = search_kernels.whitened_frames(np.ascontiguousarray(sequence.T), evaluator.whitening, ends)
         return search_kernels.Movement(
             frames, rows, white, exponents, evaluator.log_norm, evaluator.log_duration, self.d_min_, ends
@@ -203,10 +210,12 @@ class PolynomialPHMM(ConstantCovariancePHMM):
         return float(search_kernels.log_likelihood_at(self._scaled(theta), self._prepared(resampled)))
 
     def _move_means(self, change: Floats) -> None:
-        self.coefficients_ = self.coefficients_ + change
+        self.coefficients_, self._white = self.coefficients_ + change, None
 
     def _prepared(self, sequence: Floats) -> search_kernels.Movement:
-        return self._movement(sequence, self.coefficients_, self.monomials_.exponents)
+        if self._white is None:
+            self._white = self._whitened(self.coefficients_)
+        return self._movement(sequence, self._white, self.monomials_.exponents)
 
     @classmethod
     def _parameter_names(cls) -> list[str]:

@@ -81,8 +81,7 @@ class PointingWindow:
         self._clear()
 
     def _clear(self) -> None:
-        self._times_ns: deque[int] = deque()
-        self._samples: deque[Floats] = deque()
+        self._samples: deque[tuple[int, Floats]] = deque()
         self._judged_ns = -(10**18)
         self._best: WindowEstimate | None = None
         self._reported_at: Floats | None = None
@@ -95,19 +94,16 @@ class PointingWindow:
         back by more than a second, the tracker was restarted, and the earlier samples are discarded.
         """
         captured_ns, sample = pose.captured.ToNanoseconds(), self._sample(pose)
-        if self._times_ns and captured_ns < self._times_ns[-1] - RESTARTED_S * 1e9:
+        if self._samples and captured_ns < self._samples[-1][0] - RESTARTED_S * 1e9:
             self._clear()
         self.estimate = None
-        if sample is None or (self._times_ns and captured_ns <= self._times_ns[-1]):
+        if sample is None or (self._samples and captured_ns <= self._samples[-1][0]):
             return None
-        if self._times_ns and captured_ns - self._times_ns[-1] > self._options.max_gap_s * 1e9:
-            self._times_ns.clear()
+        if self._samples and captured_ns - self._samples[-1][0] > self._options.max_gap_s * 1e9:
             self._samples.clear()
             self._best = None
-        self._times_ns.append(captured_ns)
-        self._samples.append(sample)
-        while captured_ns - self._times_ns[1 if len(self._times_ns) > 1 else 0] > self._lengths_s[-1] * 1e9:
-            self._times_ns.popleft()
+        self._samples.append((captured_ns, sample))
+        while len(self._samples) > 1 and captured_ns - self._samples[1][0] > self._lengths_s[-1] * 1e9:
             self._samples.popleft()
         if captured_ns - self._judged_ns < MIN_PERIOD_S * 1e9:
             return None
@@ -141,11 +137,11 @@ class PointingWindow:
 
     def _judged(self, now_ns: int) -> WindowEstimate | None:
         """The estimate from the window that fits pointing best."""
-        times = (np.array(self._times_ns) - now_ns) * 1e-9
+        times = (np.array([captured_ns for captured_ns, _ in self._samples]) - now_ns) * 1e-9
         lengths = [length for length in self._lengths_s if length <= -times[0]]
         if not lengths:
             return None
-        samples = np.array(self._samples)
+        samples = np.array([sample for _, sample in self._samples])
         placed = self._placement.in_model(samples)
         windows = [at_times(np.linspace(-length, 0.0, FRAMES), times, placed) for length in lengths]
         examined = [self._model.pointing.examine(window) for window in windows]

@@ -124,7 +124,8 @@ class NeuralPHMM(ConstantCovariancePHMM):
         features = self.monomials_.at(self.monomials_.centre + self.monomials_.scale * position)
         means = self.networks_.means(position[None], features[None])[0]
         constant = np.zeros((1, len(position)), np.int64)
-        return float(search_kernels.log_likelihood_at(position, self._movement(resampled, means[..., None], constant)))
+        movement = self._movement(resampled, self._whitened(means[..., None]), constant)
+        return float(search_kernels.log_likelihood_at(position, movement))
 
     def _move_means(self, change: Floats) -> None:
         self.networks_ = replace(self.networks_, skip=self.networks_.skip + change)
