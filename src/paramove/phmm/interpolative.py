@@ -28,7 +28,7 @@ from paramove.phmm.estimates import ParameterEstimate
 from paramove.phmm.features import Monomials
 from paramove.phmm.grid import ParameterGrid
 from paramove.phmm.noise import AddedNoise
-from paramove.phmm.parametric import ParametricHMM, Residuals, TrainingData, inverse_information
+from paramove.phmm.parametric import ParametricHMM, Residuals, inverse_information
 from paramove.phmm.storage import check_shapes, check_states
 
 REMEDY = "demonstrate every point of a grid, or train a QuadraticPHMM, which needs none"
@@ -126,15 +126,15 @@ class InterpolativePHMM(ParametricHMM):
         self.residuals = residuals
         self.search_margin = search_margin
 
-    def _fit(self, data: TrainingData) -> None:
+    def _fit(self, sequences: list[Floats], theta: Floats, groups: Ints) -> None:
         if self.corners is None:
-            grid = ParameterGrid.from_theta(data.theta)
+            grid = ParameterGrid.from_theta(theta)
         else:
-            grid = ParameterGrid.from_corners(self.corners, self.shape or (2,) * data.theta.shape[1])
-        groups = grouped(data.sequences, data.theta, grid)
+            grid = ParameterGrid.from_corners(self.corners, self.shape or (2,) * theta.shape[1])
+        at_points = grouped(sequences, theta, grid)
         options = self._training_options()
-        everything = LeftRightHMM(self.n_states, self.d_min_, self.d_max_, options=options).fit(data.sequences)
-        local = synchronised(everything.parameters, groups, options, self.local_iterations)
+        everything = LeftRightHMM(self.n_states, self.d_min_, self.d_max_, options=options).fit(sequences)
+        local = synchronised(everything.parameters, at_points, options, self.local_iterations)
         self.training_ = everything.training_
         self._set_grid(grid)
         self.means_ = np.stack([one.means for one in local])

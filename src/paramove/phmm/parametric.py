@@ -12,7 +12,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from math import ceil
 from numbers import Integral
 from pathlib import Path
@@ -53,21 +53,6 @@ MAX_FRAMES = 100_000
 DEFAULT_FRAMES, STATE_MARGIN = 100, 0.2
 Residuals = Literal["independent", "correlated"]
 INDEPENDENT = "this model has independent residuals: train it with residuals='correlated'"
-
-
-@dataclass(frozen=True)
-class TrainingData:
-    """Checked demonstrations.
-
-    Attributes:
-        sequences: resampled to `resampled_frames` if the model does so, (T_k, D) each.
-        theta: shape (K, P).
-        groups: number of the group of each, shape (K,).
-    """
-
-    sequences: list[Floats]
-    theta: Floats
-    groups: Ints
 
 
 class ParametricHMM(ABC):
@@ -171,8 +156,8 @@ class ParametricHMM(ABC):
         """Add coefficients of the monomials (N, D, F) to the means; changes a copy of a trained model."""
 
     @abstractmethod
-    def _fit(self, data: TrainingData) -> None:
-        """Train on checked data."""
+    def _fit(self, sequences: list[Floats], theta: Floats, groups: Ints) -> None:
+        """Train on checked sequences, resampled to `resampled_frames_`, theta (K, P), and the group of each (K,)."""
 
     @abstractmethod
     def _arrays(self) -> dict[str, Floats]:
@@ -196,7 +181,7 @@ class ParametricHMM(ABC):
         labels = checked_theta(theta, len(checked))
         self._check_training(recorded, checked, labels)
         numbers = groups_of(groups, labels)
-        self._fit(TrainingData(checked, labels, numbers))
+        self._fit(checked, labels, numbers)
         self.performances_ = None
         if self.residuals == "correlated":
             self.performances_ = Performances.fitted(recorded, labels, self._features_of_executions(), numbers)

@@ -26,7 +26,7 @@ from paramove.phmm.description import MovementDescription
 from paramove.phmm.estimates import ParameterEstimate
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise
-from paramove.phmm.parametric import ParametricHMM, Residuals, TrainingData, inverse_information
+from paramove.phmm.parametric import ParametricHMM, Residuals, inverse_information
 from paramove.phmm.performance import state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
 from paramove.phmm.ridge import smoothed
@@ -57,15 +57,15 @@ class ConstantCovariancePHMM(ParametricHMM):
         return LeftRightHMM.from_parameters(parameters, self.options)
 
     def _regressed(
-        self, data: TrainingData, monomials: Monomials, options: TrainingOptions, smoothness: float | None
+        self, sequences: list[Floats], features: Floats, degrees: Ints, smoothness: float | None
     ) -> tuple[RegressedParameters, TrainingSummary]:
-        """Trained with polynomial means, from equal segments."""
-        begin = equal_segments(data.sequences, self.n_states, self.d_min_, self.d_max_, options)
-        coefficients = np.zeros((*begin.means.shape, len(monomials)))
+        """Trained with means linear in features (K, F), monomials of these degrees, from equal segments."""
+        options = self._training_options()
+        begin = equal_segments(sequences, self.n_states, self.d_min_, self.d_max_, options)
+        coefficients = np.zeros((*begin.means.shape, len(degrees)))
         coefficients[..., 0] = begin.means
         initial = RegressedParameters(coefficients, begin.covariances, begin.durations, self.d_min_)
-        features = monomials.at(data.theta)
-        return train_regressed(initial, data.sequences, features, monomials.degrees, options, smoothness)
+        return train_regressed(initial, sequences, features, degrees, options, smoothness)
 
     def _set_states(self, monomials: Monomials, covariances: Floats, durations: Floats) -> None:
         self.monomials_ = monomials
@@ -159,34 +159,25 @@ class PolynomialPHMM(ConstantCovariancePHMM):
         self.residuals = residuals
         self.search_margin = search_margin
 
-    def _fit(self, data: TrainingData) -> None:
-        options = self._training_options()
-        monomials = Monomials.of_degree(self.degree, data.theta)
-        if self.smoothness is None and monomials.n_distinct(data.theta) < len(monomials):
+    def _fit(self, sequences: list[Floats], theta: Floats, groups: Ints) -> None:
+        monomials = Monomials.of_degree(self.degree, theta)
+        if self.smoothness is None and monomials.n_distinct(theta) < len(monomials):
             raise ValueError(
-                f"{len(np.unique(data.theta, axis=0))} different theta do not determine the {len(monomials)} "
-                f"coefficients of degree {self.degree} in {data.theta.shape[1]} parameters: give more different theta, "
+                f"{len(np.unique(theta, axis=0))} different theta do not determine the {len(monomials)} "
+                f"coefficients of degree {self.degree} in {theta.shape[1]} parameters: give more different theta, "
                 "a lower degree, or a smoothness (a prior)"
             )
-        trained, self.training_ = self._regressed(data, monomials, options, self.smoothness)
+        features = monomials.at(theta)
+        trained, self.training_ = self._regressed(sequences, features, monomials.degrees, self.smoothness)
         if self.residuals == "correlated" and self.smoothness is not None:
-            averages, features = self._state_averages(data, trained, monomials), monomials.at(data.theta)
+            averages = _state_averages(sequences, theta, trained, monomials)
             known = stretched(self.description, trained.coefficients.shape, monomials)
             explained = np.einsum("ndf,kf->knd", known, features).reshape(averages.shape)
-            smooth = smoothed(features, monomials.degrees, averages - explained, data.groups)
+            smooth = smoothed(features, monomials.degrees, averages - explained, groups)
             coefficients = known + smooth.reshape(known.shape)
-            trained = with_coefficients(trained, coefficients, data.sequences, features, options)
+            trained = with_coefficients(trained, coefficients, sequences, features, self._training_options())
         self._set_states(monomials, trained.covariances, trained.durations)
         self.coefficients_ = np.ascontiguousarray(trained.coefficients)
-
-    def _state_averages(self, data: TrainingData, trained: RegressedParameters, monomials: Monomials) -> Floats:
-        """Mean of the frames of each movement in each state. Shape (K, N D)."""
-        common = Evaluator.of(trained.at(monomials.at(monomials.centre)))
-        averages = []
-        for sequence, theta in zip(data.sequences, data.theta, strict=True):
-            own = replace(common, means=trained.coefficients @ monomials.at(theta))
-            averages.append(state_averages(own.expectation(sequence)[1].T, sequence).ravel())
-        return np.stack(averages)
 
     def state_means(self, theta: ArrayLike) -> Floats:
         """Means of all states for one theta (P,) or many (M, P) (3.1). Shape (N, D) or (M, N, D)."""
@@ -248,3 +239,15 @@ class CubicPHMM(PolynomialPHMM):
 
     def __init__(self, *counts: int, degree: int = 3, **others: Any) -> None:
         super().__init__(*counts, degree=degree, **others)
+
+
+def _state_averages(
+    sequences: list[Floats], theta: Floats, trained: RegressedParameters, monomials: Monomials
+) -> Floats:
+    """Mean of the frames of each movement in each state. Shape (K, N D)."""
+    common = Evaluator.of(trained.at(monomials.at(monomials.centre)))
+    averages = []
+    for sequence, one in zip(sequences, theta, strict=True):
+        own = replace(common, means=trained.coefficients @ monomials.at(one))
+        averages.append(state_averages(own.expectation(sequence)[1].T, sequence).ravel())
+    return np.stack(averages)

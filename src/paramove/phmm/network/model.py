@@ -7,15 +7,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents import Floats
+from paramove.documents import Floats, Ints
 from paramove.hmm import TrainingOptions
 from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.features import Monomials
 from paramove.phmm.network.choice import chosen_units, with_decay
 from paramove.phmm.network.networks import StateNetworks
-from paramove.phmm.network.training import NetworkParameters, NetworkPrior, SequenceMoments, train_networks
-from paramove.phmm.parametric import TrainingData
+from paramove.phmm.network.training import NetworkPrior, SequenceMoments, train_networks
 from paramove.phmm.polynomial import ConstantCovariancePHMM
 from paramove.phmm.ridge import chosen_ridge
 from paramove.phmm.storage import check_states
@@ -71,35 +70,33 @@ class NeuralPHMM(ConstantCovariancePHMM):
         self.seed = seed
         self.search_margin = search_margin
 
-    def _fit(self, data: TrainingData) -> None:
+    def _fit(self, sequences: list[Floats], theta: Floats, groups: Ints) -> None:
         if self.skip_degree < 1 or (self.n_hidden is not None and self.n_hidden < 0) or self.gradient_steps < 1:
             raise ValueError(
                 "skip_degree and gradient_steps are at least 1, n_hidden is not negative, found "
                 f"{self.skip_degree}, {self.gradient_steps} and {self.n_hidden}"
             )
-        options = self._training_options()
-        monomials = Monomials.of_degree(self.skip_degree, data.theta)
-        aligned, _ = self._regressed(data, monomials, options, SMOOTHNESS)
-        positions, features = (data.theta - monomials.centre) / monomials.scale, monomials.at(data.theta)
+        monomials = Monomials.of_degree(self.skip_degree, theta)
+        positions, features = (theta - monomials.centre) / monomials.scale, monomials.at(theta)
+        aligned, _ = self._regressed(sequences, features, monomials.degrees, SMOOTHNESS)
         means = np.einsum("ndf,kf->knd", aligned.coefficients, features)
-        moments = SequenceMoments.gathered(aligned.at(features[0]), data.sequences, means)
+        moments = SequenceMoments.gathered(aligned.at(features[0]), sequences, means)
         metric = moments.squared.sum(axis=0) / moments.weights.sum()
         metric = metric + 1e-6 * np.trace(metric) / len(metric) * np.eye(len(metric))
         frames = float(moments.weights.sum(axis=0).mean())
         flat = moments.averages.reshape(len(positions), -1)
-        strengths = np.array([0.0, *chosen_ridge(flat, features, monomials.degrees, data.groups)])
+        strengths = np.array([0.0, *chosen_ridge(flat, features, monomials.degrees, groups)])
         ridge = frames * strengths[monomials.degrees]
         same = np.broadcast_to(metric, aligned.covariances.shape)
         targets = NetworkPrior(metric, ridge).targets(positions, features, moments, same)
-        choice = chosen_units(targets, data.groups, self.n_hidden, self.n_restarts, self.seed)
+        choice = chosen_units(targets, groups, self.n_hidden, self.n_restarts, self.seed)
         targets = with_decay(targets, choice)
-        begin = NetworkParameters(targets.networks(choice.inner), aligned.covariances, aligned.durations, self.d_min_)
-        prior = NetworkPrior(metric, targets.ridge)
-        trained, self.training_ = train_networks(
-            begin, prior, data.sequences, positions, features, options, self.gradient_steps
-        )
-        self._set_states(monomials, trained.covariances, trained.durations)
-        self._set_networks(trained.networks)
+        networks, parameters, self.training_ = train_networks(
+            targets.networks(choice.inner), aligned.at(features[0]), NetworkPrior(metric, targets.ridge), sequences,
+            positions, features, self._training_options(), self.gradient_steps,
+        )  # fmt: skip
+        self._set_states(monomials, parameters.covariances, parameters.durations)
+        self._set_networks(networks)
 
     def _set_networks(self, networks: StateNetworks) -> None:
         # Contiguous, as after reading a file: sums in another order differ in the last bits.

@@ -27,25 +27,6 @@ from paramove.phmm.network.networks import INNER_DEVIATION, StateNetworks, State
 
 
 @dataclass(frozen=True)
-class NetworkParameters:
-    """A family of HMMs whose means are networks.
-
-    Attributes:
-        networks: of the states. covariances: (N, D, D). durations: p_i(d) in column d - 1, (N, d_max).
-        d_min: smallest number of frames of a state.
-    """
-
-    networks: StateNetworks
-    covariances: Floats
-    durations: Floats
-    d_min: int
-
-    def with_means(self, means: Floats) -> Parameters:
-        """The HMM with these means (N, D)."""
-        return Parameters(means, self.covariances, self.durations, self.d_min)
-
-
-@dataclass(frozen=True)
 class SequenceMoments:
     """Expected sums of each sequence, with residuals r of the means (K, N, D) with which they were gathered.
 
@@ -124,41 +105,41 @@ class NetworkPrior:
 
 
 def train_networks(
-    initial: NetworkParameters,
+    networks: StateNetworks,
+    parameters: Parameters,
     prior: NetworkPrior,
     sequences: Sequence[Floats],
     positions: Floats,
     features: Floats,
     options: TrainingOptions,
     gradient_steps: int,
-) -> tuple[NetworkParameters, TrainingSummary]:
+) -> tuple[StateNetworks, Parameters, TrainingSummary]:
     """Iterate until the objective converges: few gradient steps in each iteration raise it without maximising it.
 
     Args:
-        initial: with covariances that need no more annealing.
+        networks: to begin with.
+        parameters: covariances, which need no more annealing, and durations of all theta; means of any one.
         positions: scaled theta, (K, P). features: monomials, (K, F).
     """
     monitor = ConvergenceMonitor(options.tolerance, sum(len(sequence) for sequence in sequences))
-    scale = root_mean_deviation(sequences)
-    parameters, target = initial, None
+    scale, target = root_mean_deviation(sequences), None
     for _ in range(options.max_iterations):
-        means = parameters.networks.means(positions, features)
-        moments = SequenceMoments.gathered(parameters.with_means(means[0]), sequences, means)
+        means = networks.means(positions, features)
+        moments = SequenceMoments.gathered(parameters, sequences, means)
         if target is None:
             target = pooled_covariance(moments.scatter(means), moments.weights.sum(axis=0))
         regularisation = regularisation_at(options.annealing_iterations, options, scale, target)  # it is over
-        objective = moments.log_likelihood + prior.log_density(parameters.networks)
-        objective += penalty(parameters.with_means(means[0]), regularisation)
+        objective = moments.log_likelihood + prior.log_density(networks)
+        objective += penalty(parameters, regularisation)
         monitor.add(moments.log_likelihood, objective)
         if monitor.converged:
             break
         targets = prior.targets(positions, features, moments, parameters.covariances)
-        networks = targets.networks(targets.improved(parameters.networks.inner, gradient_steps))
+        networks = targets.networks(targets.improved(networks.inner, gradient_steps))
         scatter = moments.scatter(networks.means(positions, features))
-        parameters = NetworkParameters(
-            networks,
-            covariances_of(scatter, moments.weights.sum(axis=0), regularisation),
-            durations_of(moments.durations, parameters.d_min, options.duration_pseudocount),
-            parameters.d_min,
+        parameters = replace(
+            parameters,
+            covariances=covariances_of(scatter, moments.weights.sum(axis=0), regularisation),
+            durations=durations_of(moments.durations, parameters.d_min, options.duration_pseudocount),
         )
-    return parameters, monitor.summary(len(sequences))
+    return networks, parameters, monitor.summary(len(sequences))
