@@ -64,7 +64,7 @@ def _refined(
     weights = [one.weight for one in gathered]
     # Broadcast over states: the target of state i is the mean of state i over the groups.
     target = np.sum(scatters, axis=0) / np.sum(weights, axis=0)[:, None, None]
-    regularisation = regularisation_at(options.annealing_iterations, options, scale, target)  # it is over
+    regularisation = regularisation_at(options.annealing_iterations, options, scale, target)  # annealing is over
     return [
         Parameters(
             mean,

@@ -128,7 +128,7 @@ def train_networks(
         moments = SequenceMoments.gathered(parameters, sequences, means)
         if target is None:
             target = pooled_covariance(moments.scatter(means), moments.weights.sum(axis=0))
-        regularisation = regularisation_at(options.annealing_iterations, options, scale, target)  # it is over
+        regularisation = regularisation_at(options.annealing_iterations, options, scale, target)  # annealing is over
         objective = moments.log_likelihood + prior.log_density(networks)
         objective += penalty(parameters, regularisation)
         monitor.add(moments.log_likelihood, objective)
