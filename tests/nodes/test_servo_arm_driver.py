@@ -20,8 +20,7 @@ from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
-from paramove.operator.terminal_arming import request_arming
-from paramove.operator.terminal_stop import stop_arm
+from paramove.operator.terminal import request_arming, stop_arm
 from paramove.robots.description import RobotDescription
 from sim.emulated_arm import emulated_servos
 

@@ -1,17 +1,20 @@
-"""A person's arming request from outside of a run, and the safety gate's answer to it."""
+"""A person's requests from outside of a run, to arm, to disarm or to stop, and the safety gate's answers."""
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import zmq
 
-from paramove.bus import BusVisitor, Subscriber, publish_now, topics
-from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
+from paramove.bus import BusVisitor, Subscriber, TopicTakenError, publish_now, topics
+from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState, StopRequest
+from paramove.safety import PERSON_STOP
 
 POLL_PERIOD_S = 0.02
+"""Also from one publication of a stop to the next."""
 TERMINAL = "terminal"
 """Source of the request."""
 
@@ -51,6 +54,45 @@ def obeyed(state: SafetyState, armed: bool) -> bool:
     """Whether the gate is in the requested state."""
     is_armed = state.state == SafetyState.STATE_ARMED
     return is_armed if armed else state.state == SafetyState.STATE_DISARMED
+
+
+def stop_arm(folder: Path, source: str, timeout_s: float) -> SafetyState | None:
+    """Publishes a stop on all free topics of stops, until the gate has latched it or the timeout has passed.
+
+    Args:
+        folder: Of the run's bus.
+        source: Where the person pressed, for the message of the fault that the gate latches.
+        timeout_s: To wait for the gate's answer.
+
+    Returns:
+        The gate's answer, None if there was none.
+
+    Raises:
+        TopicTakenError: Other programs publish all topics of stops, such as the live page and another terminal.
+        BusFolderError: The folder cannot be used.
+    """
+    request = StopRequest(source=source)
+    request.captured.FromNanoseconds(time.monotonic_ns())
+    with BusVisitor(folder, "estop") as bus:
+        publishers = []
+        for topic in topics.PERSONS_STOPS:
+            with contextlib.suppress(TopicTakenError):
+                publishers.append(bus.publisher(topic))
+        if not publishers:
+            raise TopicTakenError(
+                f"other programs already publish {' and '.join(topic.name for topic in topics.PERSONS_STOPS)}"
+            )
+
+        def publish() -> None:
+            for publisher in publishers:
+                publisher.publish(request, time.monotonic_ns(), time.monotonic_ns())  # a driver heeds what is new
+
+        state = _until(bus.subscriber(topics.ARM_SAFETY), timeout_s, _is_stopped, publish)
+    return state if state is not None and _is_stopped(state) else None
+
+
+def _is_stopped(state: SafetyState) -> bool:
+    return any(fault.code == PERSON_STOP for fault in state.faults)
 
 
 def _faults(state: SafetyState) -> list[str]:

@@ -1,4 +1,4 @@
-"""A word to arm from another process than the run's, and what the gate makes of it."""
+"""A word to arm, or a stop, from another process than the run's, and what the gate makes of it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from paramove.bus.bus import Bus
 from paramove.bus.endpoint import TopicTakenError
 from paramove.bus.settings import BusSettings
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
-from paramove.operator.terminal_arming import request_arming
+from paramove.operator.terminal import request_arming, stop_arm
+from paramove.safety.gate_io import PERSON_STOP
 
 FAULT = SafetyFault(code="not_calibrated", detail="this one is not calibrated")
 OTHER = SafetyFault(code="person_stop", detail="stopped from the page by a person")
@@ -27,18 +28,18 @@ def folder():
 
 
 @contextlib.contextmanager
-def gate(folder, before, *answers):
-    """An arm's driver in a thread of its own, in a state, and what it says to a word; the words that it heard."""
+def driver(folder, heard_topics, before, answers_to):
+    """An arm's driver in a thread of its own, in a state, and what it says to what it hears; yields what that was."""
     heard, made, ready = [], [], threading.Event()
 
     def drive():
-        with Bus("driver", BusSettings(folder=folder), (topics.OPERATOR_ARM,), (topics.ARM_SAFETY,)) as bus:
+        with Bus("driver", BusSettings(folder=folder), heard_topics, (topics.ARM_SAFETY,)) as bus:
             made.append(bus)
             bus.publish(topics.ARM_SAFETY, before)
             ready.set()
-            for event in bus.events(topics.OPERATOR_ARM):
-                heard.append((event.message.armed, event.message.source))
-                for answer in answers:
+            for event in bus.events(*heard_topics):
+                heard.append(event)
+                for answer in answers_to(event.message):
                     bus.publish(topics.ARM_SAFETY, answer)
 
     thread = threading.Thread(target=drive)
@@ -47,6 +48,19 @@ def gate(folder, before, *answers):
     yield heard
     made[0].stop()
     thread.join()
+
+
+@contextlib.contextmanager
+def gate(folder, before, *answers):
+    """A driver that says the same to every word to arm; yields the words that it heard."""
+    words = []
+
+    def answers_to(word):
+        words.append((word.armed, word.source))
+        return answers
+
+    with driver(folder, (topics.OPERATOR_ARM,), before, answers_to):
+        yield words
 
 
 def state(name, *faults):
@@ -96,3 +110,47 @@ def test_an_operator_that_arms_already_is_told(folder):
         pytest.raises(TopicTakenError, match="operator"),
     ):
         request_arming(folder, True, 0.1)
+
+
+def stopped(request):
+    fault = SafetyFault(code=PERSON_STOP, detail=f"stopped from the {request.source} by a person")
+    return [state("STOPPING", fault)]
+
+
+def gate_for_stops(folder, answers_to=stopped):
+    return driver(folder, topics.STOPS, state("ARMED"), answers_to)
+
+
+def test_the_gate_answers(folder):
+    with gate_for_stops(folder) as heard:
+        answer = stop_arm(folder, "terminal", 10.0)
+    assert answer.state == SafetyState.STATE_STOPPING
+    assert answer.faults[0].detail == "stopped from the terminal by a person"
+    assert {event.message.source for event in heard} == {"terminal"}
+
+
+def test_the_live_page_is_no_obstacle(folder):
+    with gate_for_stops(folder) as heard, Bus("dashboard", BusSettings(folder=folder), (), (topics.OPERATOR_STOP,)):
+        answer = stop_arm(folder, "terminal", 10.0)
+    assert answer is not None
+    assert {event.topic.name for event in heard} == {"operator/estop"}
+
+
+def test_the_topics_are_free_again_afterwards(folder):
+    with gate_for_stops(folder):
+        for _ in range(2):
+            assert stop_arm(folder, "terminal", 10.0) is not None
+
+
+def test_silence_is_no_stop(folder):
+    with gate_for_stops(folder, lambda request: []):
+        assert stop_arm(folder, "terminal", 0.3) is None
+    assert stop_arm(folder, "terminal", 0.1) is None
+
+
+def test_when_others_say_all_stops_it_is_told(folder):
+    with (
+        Bus("dashboard", BusSettings(folder=folder), (), topics.STOPS),
+        pytest.raises(TopicTakenError, match="other programs already publish operator/stop and operator/estop"),
+    ):
+        stop_arm(folder, "terminal", 0.1)
