@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from paramove.documents.positions import DocumentError, read_mapping
 from paramove.supervision import launch_file
-from paramove.supervision.launch_file import LaunchFileMissingError, start_waves, validated
-from paramove.supervision.stopping import stop_waves
+from paramove.supervision.launch_file import LaunchFileMissingError, validated
+from paramove.supervision.stopping import start_waves, stop_waves
 from paramove.workspace import Workspace
 
 GOOD = """\

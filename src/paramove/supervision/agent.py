@@ -5,7 +5,7 @@ connection ends, or is silent for `SILENT_S`, it ends its nodes by itself, the a
 the launcher:
 
     {"begin": {…}}                     the launch file, the domain, the release, the age of the run; once, on that line
-    {"start": NODE, "nice": N}         the answer is "started", or "failed"
+    {"start": NODE}                    the answer is "started", or "failed"
     {"end": NODE}, {"kill": NODE}      SIGTERM, SIGKILL
     {}                                 it is alive; twice a second
 
@@ -35,12 +35,12 @@ from typing import Any
 from paramove.documents import Document
 from paramove.source_code import code_digest
 from paramove.supervision.domain import DomainError, held_domain
-from paramove.supervision.environment import LimitError, allow_open_files, node_environment
+from paramove.supervision.environment import LimitError, allow_open_files
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.launch_schema import LaunchFile
 from paramove.supervision.processes import Guard, SupervisedProcess, node_process
 from paramove.supervision.run_folder import RunFolder
-from paramove.supervision.stopping import STOP_S, stop_waves
+from paramove.supervision.stopping import stop_in_waves
 from paramove.workspace import Workspace
 
 ALIVE_S, SILENT_S = 0.5, 3.0
@@ -129,7 +129,13 @@ class Agent:
                 self._file = file
                 with Guard() as self._guard:
                     self._serve()
-                    self._stop_all()
+                    stop_in_waves(
+                        file,
+                        is_running=self._processes.__contains__,
+                        stop=self._terminate,
+                        kill=self._kill,
+                        wait=self._wait,
+                    )
         except (DomainError, LimitError, OSError) as error:
             self._say(rejected=str(error))
             return False
@@ -153,39 +159,35 @@ class Agent:
             self._wait()
             for line in self._lines.read():
                 self._latest_s = time.monotonic()
-                self._obey(line)
-            self._report()
+                if (name := line.get("start")) in self._file.nodes:
+                    self._start(name)
+                self._terminate(line.get("end", ""))
+                self._kill(line.get("kill", ""))
 
     def _wait(self) -> None:
+        """Waits a moment for a line, or an end, and reports what has happened."""
         waited: list[int] = [] if self._lines.ended else [self._lines.descriptor]
-        select.select([*waited, *(one.pidfd for one in self._processes.values())], [], [], _PERIOD_S)
+        select.select([*waited, *(one.descriptor for one in self._processes.values())], [], [], _PERIOD_S)
+        self._report()
 
-    def _obey(self, line: dict[str, Any]) -> None:
-        if (name := line.get("start")) in self._file.nodes:
-            self._start(name, int(line.get("nice", 0)))
-        if (process := self._processes.get(line.get("end", ""))) is not None:
-            process.terminate()
-        if (process := self._processes.get(line.get("kill", ""))) is not None:
-            process.kill()
-
-    def _start(self, name: str, nice: int) -> None:
+    def _start(self, name: str) -> None:
         if name in self._processes:
             return
         try:
-            process = node_process(
-                self._file.nodes[name].module,
-                self._folder.config(name),
-                self._folder.log(name),
-                nice,
-                folder=self._workspace.root,
-                environment=node_environment(os.environ, self._workspace),
-                guard=self._guard,
-            )
+            process = node_process(name, self._file.nodes[name], self._folder, self._workspace, self._guard)
         except OSError as error:
             self._say(failed=name, reason=error.strerror or str(error))
             return
         self._processes[name] = process
         self._say(started=name, pid=process.pid)
+
+    def _terminate(self, name: str) -> None:
+        if name in self._processes:
+            self._processes[name].terminate()
+
+    def _kill(self, name: str) -> None:
+        if name in self._processes:
+            self._processes[name].kill()
 
     def _report(self) -> None:
         """Ends, stops (SIGSTOP), output, and that it is alive."""
@@ -208,21 +210,6 @@ class Agent:
             if text := file.read(_LOG_BYTES):
                 self._logs[name] = file.tell()
                 self._say(log=name, text=text.decode("utf-8", "replace"))
-
-    def _stop_all(self) -> None:
-        """Ends what is left, in the order of a launcher: nodes with `stop: first`, then the others."""
-        for wave in stop_waves(self._file):
-            mine = [name for name in wave if name in self._processes]
-            for name in mine:
-                self._processes[name].terminate()
-            end_s = time.monotonic() + STOP_S
-            while any(name in self._processes for name in mine):
-                if time.monotonic() > end_s:
-                    for name in mine:
-                        if name in self._processes:
-                            self._processes[name].kill()
-                self._wait()
-                self._report()
 
     def _say(self, **content: Any) -> None:
         with contextlib.suppress(OSError):  # nobody reads it any more

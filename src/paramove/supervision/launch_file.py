@@ -249,20 +249,3 @@ def _keys_at(path: KeyPath) -> list[str]:
             return []
         model = models[0]
     return list(model.model_fields)
-
-
-def start_waves(file: LaunchFile) -> list[list[str]]:
-    """Nodes in the order of their start: each wave needs only nodes of earlier waves.
-
-    Raises DocumentError if nodes wait for each other in a circle, which `load` rejects.
-    """
-    waves: list[list[str]] = []
-    placed: set[str] = set()
-    while len(placed) < len(file.nodes):
-        wave = [name for name, node in file.nodes.items() if name not in placed and placed.issuperset(node.after)]
-        if not wave:
-            left = [name for name in file.nodes if name not in placed]
-            raise DocumentError(Position("launch file"), f"these nodes can never start: {', '.join(left)}")
-        waves.append(wave)
-        placed.update(wave)
-    return waves

@@ -11,15 +11,20 @@ import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Protocol, Self
+from typing import IO, Self
 
 import psutil
 
 from paramove.documents import printable
+from paramove.supervision.environment import node_environment
+from paramove.supervision.launch_schema import NodeSettings
+from paramove.supervision.run_folder import RunFolder
+from paramove.workspace import Workspace
 
 _HERE = Path(__file__).parent
 _NO_SITE = ("-I", "-S")  # these two files need the standard library only, and start faster so
+NICE = {"low": 5, "normal": 0, "high": -10}
+"""Nice value by the launch file's priority."""
 
 
 class Guard:
@@ -37,9 +42,7 @@ class Guard:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Lets the guard end what is still watched, and waits for it."""
         if self._process.stdin is not None:
             with contextlib.suppress(BrokenPipeError):
@@ -61,26 +64,12 @@ class Guard:
                 self._process.stdin.flush()
 
 
-class NodeProcess(Protocol):
-    """A node's process as its supervisor sees it; see `SupervisedProcess`."""
-
-    pid: int
-    pidfd: int
-
-    def prioritise(self, nice: int) -> None: ...
-    def ended(self) -> int | None: ...
-    def halted(self) -> bool | None: ...
-    def memory_mb(self) -> float: ...
-    def terminate(self) -> None: ...
-    def kill(self) -> None: ...
-
-
 class SupervisedProcess:
     """One started command: leader of its own session and process group, tied to the launcher's life.
 
     Attributes:
         pid: Process id, which is also the id of its process group.
-        pidfd: Readable as soon as the process has ended.
+        descriptor: Readable as soon as the process has ended.
     """
 
     def __init__(
@@ -99,7 +88,7 @@ class SupervisedProcess:
         if threading.current_thread() is not threading.main_thread():
             raise RuntimeError("processes are started from the main thread, whose end is the launcher's end")
         tied = [sys.executable, *_NO_SITE, str(_HERE / "tied.py"), str(os.getpid()), *command]
-        with _output(log) as output:
+        with log.open("ab") if log else contextlib.nullcontext() as output:
             self._process = subprocess.Popen(
                 tied,
                 cwd=folder,
@@ -110,7 +99,7 @@ class SupervisedProcess:
                 start_new_session=True,
             )
         self.pid = self._process.pid
-        self.pidfd = os.pidfd_open(self.pid)
+        self.descriptor = os.pidfd_open(self.pid)
         self._guard = guard
         guard.watch(self.pid)
 
@@ -132,10 +121,10 @@ class SupervisedProcess:
         What it started and left behind is killed with it.
         """
         code = self._process.poll()
-        if code is not None and self.pidfd >= 0:
+        if code is not None and self.descriptor >= 0:
             self._signal(signal.SIGKILL)
-            os.close(self.pidfd)
-            self.pidfd = -1
+            os.close(self.descriptor)
+            self.descriptor = -1
             self._guard.forget(self.pid)
         return code
 
@@ -174,22 +163,18 @@ class SupervisedProcess:
 
 
 def node_process(
-    module: str, config: Path, log: Path, nice: int, *, folder: Path, environment: Mapping[str, str], guard: Guard
+    name: str, settings: NodeSettings, run_folder: RunFolder, workspace: Workspace, guard: Guard
 ) -> SupervisedProcess:
-    """Starts a node's module with its configuration."""
-    command = [sys.executable, "-m", module, "--config", str(config)]
-    process = SupervisedProcess(command, folder=folder, environment=environment, guard=guard, log=log)
-    process.prioritise(nice)
+    """Starts a node's module with its configuration, at its priority."""
+    process = SupervisedProcess(
+        [sys.executable, "-m", settings.module, "--config", str(run_folder.config(name))],
+        folder=workspace.root,
+        environment=node_environment(os.environ, workspace),
+        guard=guard,
+        log=run_folder.log(name),
+    )
+    process.prioritise(NICE[settings.priority])
     return process
-
-
-@contextlib.contextmanager
-def _output(log: Path | None):  # type: ignore[no-untyped-def]
-    if log is None:
-        yield None
-        return
-    with log.open("ab") as file:
-        yield file
 
 
 def last_lines(file: Path, count: int) -> list[str]:

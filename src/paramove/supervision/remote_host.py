@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import select
 import subprocess
 import time
@@ -79,17 +78,14 @@ class RemoteHost:
             self._take(line)
         if not self.lost and (self._lines.ended or now_s - self._latest_s > SILENT_S):
             self.lost = "its agent has ended" if self._lines.ended else f"it is silent for {SILENT_S:g} s"
-            for process in self._processes.values():
-                process.has_ended(LOST)
-            self._processes.clear()
         if self._begin is None and not self.lost and now_s >= self._alive_due_s:
             self._alive_due_s = now_s + ALIVE_S
             self.send()
 
-    def start(self, node: str, nice: int) -> RemoteProcess:
+    def start(self, node: str) -> RemoteProcess:
         """Starts a node's process there. Raises OSError if that fails."""
         self._answers.pop(node, None)
-        self.send(start=node, nice=nice)
+        self.send(start=node)
         end_s = time.monotonic() + START_S
         while node not in self._answers and not self.lost and time.monotonic() < end_s:
             select.select([self.descriptor], [], [], ALIVE_S)
@@ -135,36 +131,30 @@ class RemoteHost:
                 file.write(str(line.get("text", "")))
         process = self._processes.get(str(line.get("ended", line.get("halted", ""))))
         if process is not None and "ended" in line:
-            del self._processes[process.node]
-            process.has_ended(int(line["code"]))
+            process.code = int(line["code"])
         elif process is not None:
             process.is_halted = bool(line["is"])
 
 
 class RemoteProcess:
-    """A node's process on another host; see `NodeProcess`."""
+    """A node's process on another host. Its methods are those of `SupervisedProcess`.
+
+    Attributes:
+        pid: Of the process there.
+        descriptor: Readable as soon as its agent has reported something.
+        code: Exit code that the agent has reported; None before.
+        is_halted: Whether the agent has reported since the last call of `halted` that it was stopped, or continued.
+    """
 
     def __init__(self, host: RemoteHost, node: str, pid: int) -> None:
-        self.node, self.pid = node, pid
-        self.pidfd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self.pid, self.descriptor = pid, host.descriptor
+        self.code: int | None = None
         self.is_halted: bool | None = None
-        self._host = host
-        self._code: int | None = None
-
-    def prioritise(self, nice: int) -> None:
-        """Its agent has done that."""
-
-    def has_ended(self, code: int) -> None:
-        """The agent reports its end."""
-        self._code = code
-        os.eventfd_write(self.pidfd, 1)
+        self._host, self._node = host, node
 
     def ended(self) -> int | None:
-        """See `SupervisedProcess.ended`."""
-        if self._code is not None and self.pidfd >= 0:
-            os.close(self.pidfd)
-            self.pidfd = -1
-        return self._code
+        """Exit code once the process has ended, or is lost with its host, else None."""
+        return LOST if self.code is None and self._host.lost else self.code
 
     def halted(self) -> bool | None:
         """See `SupervisedProcess.halted`."""
@@ -177,8 +167,8 @@ class RemoteProcess:
 
     def terminate(self) -> None:
         """See `SupervisedProcess.terminate`."""
-        self._host.send(end=self.node)
+        self._host.send(end=self._node)
 
     def kill(self) -> None:
         """See `SupervisedProcess.kill`."""
-        self._host.send(kill=self.node)
+        self._host.send(kill=self._node)

@@ -9,9 +9,11 @@ from dataclasses import dataclass, field
 from paramove.documents import FAILURE, NEVER_RESTARTED, OK, describe, printable
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.supervision.launch_schema import NodeSettings
-from paramove.supervision.processes import NodeProcess
+from paramove.supervision.processes import SupervisedProcess
+from paramove.supervision.remote_host import RemoteProcess
 from paramove.supervision.stopping import STOP_S
 
+NodeProcess = SupervisedProcess | RemoteProcess
 LONGEST_BACKOFF_S = 30.0
 
 

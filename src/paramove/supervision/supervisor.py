@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import signal
@@ -9,9 +10,10 @@ import sys
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from types import FrameType, MappingProxyType, TracebackType
+from types import FrameType
 from typing import Any, Protocol, Self
 
+from paramove.bus import BusSettings, Exchange, topics
 from paramove.documents import exit_codes
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.supervision import by_hand
@@ -20,23 +22,17 @@ from paramove.supervision.domain import Domain
 from paramove.supervision.environment import node_environment
 from paramove.supervision.events import EventLog, signal_name
 from paramove.supervision.launch_file import Launch
-from paramove.supervision.processes import Guard, NodeProcess, SupervisedProcess, last_lines, node_process
+from paramove.supervision.processes import Guard, SupervisedProcess, last_lines, node_process
 from paramove.supervision.remote_host import RemoteHost
 from paramove.supervision.run_folder import RunFolder
-from paramove.supervision.status_subscriber import StatusSubscriber
-from paramove.supervision.stopping import STOP_S, stop_waves
-from paramove.supervision.supervised_node import ENDED, State, SupervisedNode
+from paramove.supervision.stopping import stop_in_waves
+from paramove.supervision.supervised_node import ENDED, NodeProcess, State, SupervisedNode
 from paramove.workspace import Workspace
 
 _ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _SUSPENDS = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 POLL_PERIOD_S = 0.05
 """Longest wait between two reads of the bus; the end of a process is noticed at once."""
-STOP_ALL_S = 10.0
-"""For all waves together."""
-
-NICE = {"low": 5, "normal": 0, "high": -10}
-"""Nice value by the launch file's priority."""
 
 
 @dataclass(frozen=True)
@@ -93,29 +89,32 @@ class Supervisor:
         run_folder: RunFolder,
         domain: Domain,
         view: View,
-        hosts: Mapping[str, RemoteHost] = MappingProxyType({}),
+        hosts: Mapping[str, RemoteHost],
     ) -> None:
         self._file = launch.file
-        self._judge_options = ["--no-video"] if launch.headless else []
-        self._workspace = workspace.root
+        self._headless = launch.headless
+        self._workspace = workspace
         self._folder = run_folder
         self._view = view
-        self._hosts = dict(hosts)
+        self._hosts = hosts
         self._interrupts = Interrupts()
         self.nodes = {
             name: SupervisedNode(name, node, self._spawn_node, self._changed) for name, node in self._file.nodes.items()
         }
-        self._status_folder = domain.folder
-        self._environment = node_environment(os.environ, workspace)
+        self._bus_folder = domain.folder
+        self._stage: int | None = None
         self._ending = False
+        self._stop_s = 0.0
 
     def run(self) -> Outcome:
         """Starts, supervises and ends the nodes, then calls `after_run`.
 
         An interrupted run is not judged: `after_run` is left out.
         """
-        statuses = StatusSubscriber(self._status_folder, self.nodes, self._handle_status, self._view.story)
-        control = ControlServer(self._status_folder, self._by_hand)
+        self._bus = Exchange("supervisor", BusSettings(folder=self._bus_folder))
+        for topic in (topics.SPEECH, topics.APPLICATION_STAGE, *map(topics.status, self.nodes)):
+            self._bus.subscribe(topic)
+        control = ControlServer(self._bus_folder, self._by_hand)
         with (
             EventLog(self._folder.events) as self._events,
             Guard() as self._guard,
@@ -124,12 +123,12 @@ class Supervisor:
         ):
             self._events.write("run_begins", pid=os.getpid())
             try:
-                outcome = self._supervise(statuses)
+                outcome = self._supervise()
                 self._events.write("run_stops", sentence=outcome.reason, exit_code=outcome.code)
-                self._stop_all(statuses)
+                self._stop_all()
             finally:
                 self._kill_all()
-                statuses.close()
+                self._bus.close()
                 self._view.close()
             if self._file.after_run and self._interrupts.first is None and outcome.code not in exit_codes.INTERRUPTED:
                 outcome = self._judge(self._file.after_run, outcome)
@@ -153,12 +152,12 @@ class Supervisor:
         )
         self._view.changed(node)
 
-    def _supervise(self, statuses: StatusSubscriber) -> Outcome:
+    def _supervise(self) -> Outcome:
         """Runs until something ends the run; the reason is the outcome."""
         limit_s = time.monotonic() + (self._file.time_limit_s or float("inf"))
         while True:
             self._start_due()
-            for node, code in self._poll(statuses):
+            for node, code in self._poll():
                 node.conclude(code, time.monotonic())
                 if node.state is State.GIVEN_UP and node.event == "ended":
                     self._show_log(node)
@@ -171,7 +170,7 @@ class Supervisor:
             if node.state is State.WAITING and all(self.nodes[other].is_up for other in node.settings.after):
                 node.start(time.monotonic())
 
-    def _poll(self, statuses: StatusSubscriber) -> list[tuple[SupervisedNode, int]]:
+    def _poll(self) -> list[tuple[SupervisedNode, int]]:
         """Waits up to `POLL_PERIOD_S` for an end, a stop (SIGSTOP) or a signal, and reads the bus.
 
         Returns the nodes that have just ended, with exit codes.
@@ -182,14 +181,15 @@ class Supervisor:
             poll.register(descriptor, select.POLLIN)
         for node in self.nodes.values():
             if node.process is not None:
-                poll.register(node.process.pidfd, select.POLLIN)
+                poll.register(node.process.descriptor, select.POLLIN)
         poll.poll(POLL_PERIOD_S * 1e3)
         if not self._interrupts.urgent:
-            _drain(self._interrupts.wake_fd)
+            with contextlib.suppress(BlockingIOError):
+                os.eventfd_read(self._interrupts.wake_fd)
         self._ignore_suspension()
         self._control.serve()
         self._serve_hosts()
-        statuses.listen()
+        self._read_bus()
         now_s = time.monotonic()
         checked = [(node, node.check(now_s)) for node in self.nodes.values()]
         self._view.refresh(self.nodes.values())
@@ -241,27 +241,30 @@ class Supervisor:
         waiting = [node for node in self.nodes.values() if node.state is State.WAITING]
         return [node.name for node in waiting if given_up.intersection(node.settings.after)]
 
-    def _stop_all(self, statuses: StatusSubscriber) -> None:
+    def _stop_all(self) -> None:
         self._ending = True
-        end_s = time.monotonic() + STOP_ALL_S
         for node in self.nodes.values():
             if not node.is_running:
                 node.stop()  # it is not started any more
-        for wave in stop_waves(self._file):
-            begun_s = time.monotonic()
-            for name in wave:
-                self.nodes[name].stop()
-            wave_end_s = min(begun_s + STOP_S, end_s)
-            while any(self.nodes[name].is_running for name in wave):
-                if self._interrupts.urgent:
-                    self._kill_all()
-                elif time.monotonic() > wave_end_s:
-                    for name in wave:
-                        self.nodes[name].kill()
-                for node, code in self._poll(statuses):
-                    if node.state is not State.STOPPING:  # ended by itself while others were being stopped
-                        self._view.problem(f"{node.name} {exit_codes.describe(code)} before it was requested to end")
-                    node.stopped(code, time.monotonic() - begun_s)
+        stop_in_waves(
+            self._file,
+            is_running=lambda name: self.nodes[name].is_running,
+            stop=self._stop,
+            kill=lambda name: self.nodes[name].kill(),
+            wait=self._wait_for_ends,
+        )
+
+    def _stop(self, name: str) -> None:
+        self._stop_s = time.monotonic()
+        self.nodes[name].stop()
+
+    def _wait_for_ends(self) -> None:
+        if self._interrupts.urgent:
+            self._kill_all()
+        for node, code in self._poll():
+            if node.state is not State.STOPPING:  # ended by itself while others were being stopped
+                self._view.problem(f"{node.name} {exit_codes.describe(code)} before it was requested to end")
+            node.stopped(code, time.monotonic() - self._stop_s)
 
     def _kill_all(self) -> None:
         for node in self.nodes.values():
@@ -269,8 +272,13 @@ class Supervisor:
 
     def _judge(self, module: str, outcome: Outcome) -> Outcome:
         """Calls `after_run` with the run folder; its exit code decides whether a run without failure succeeds."""
-        command = [sys.executable, "-m", module, str(self._folder.path), *self._judge_options]
-        judge = SupervisedProcess(command, folder=self._workspace, environment=self._environment, guard=self._guard)
+        options = ["--no-video"] if self._headless else []
+        judge = SupervisedProcess(
+            [sys.executable, "-m", module, str(self._folder.path), *options],
+            folder=self._workspace.root,
+            environment=node_environment(os.environ, self._workspace),
+            guard=self._guard,
+        )
         code = judge.ended()
         while code is None:
             if self._interrupts.urgent:
@@ -278,7 +286,7 @@ class Supervisor:
             elif self._interrupts.first is not None:
                 judge.terminate()
             self._ignore_suspension()
-            select.select([judge.pidfd], [], [], POLL_PERIOD_S)
+            select.select([judge.descriptor], [], [], POLL_PERIOD_S)
             code = judge.ended()
         if self._interrupts.first is not None:
             return Outcome(
@@ -292,32 +300,27 @@ class Supervisor:
     def _spawn_node(self, name: str) -> NodeProcess:
         node = self._file.nodes[name]
         if node.host is not None:
-            return self._hosts[node.host].start(name, NICE[node.priority])
-        return node_process(
-            node.module,
-            self._folder.config(name),
-            self._folder.log(name),
-            NICE[node.priority],
-            folder=self._workspace,
-            environment=self._environment,
-            guard=self._guard,
-        )
+            return self._hosts[node.host].start(name)
+        return node_process(name, node, self._folder, self._workspace, self._guard)
 
-    def _handle_status(self, status: NodeStatus) -> None:
-        if status.node in self.nodes:
-            self.nodes[status.node].handle(status)
+    def _read_bus(self) -> None:
+        """Handles what has come in: statuses of nodes, the robot's speech, stages of the application."""
+        self._bus.wait(0.0)
+        for received in self._bus.take(self._bus.subscribers):
+            message = received.message
+            if received.topic.type is NodeStatus:
+                if message.node in self.nodes:
+                    self.nodes[message.node].handle(message)
+            elif received.topic is topics.SPEECH:
+                self._view.story(f'robot: "{message.text}"')
+            elif message.stage != self._stage:
+                self._stage = message.stage
+                self._view.story(f"stage: {message.Stage.Name(message.stage).removeprefix('STAGE_').lower()}")
 
     def _show_log(self, node: SupervisedNode) -> None:
         path = self._folder.log(node.name)
         lines = "\n".join(f"    {line}" for line in last_lines(path, 20))
         self._view.problem(f"{node.name} {node.detail}. Last lines of {path}:\n{lines or '    (empty)'}")
-
-
-def _drain(wake_fd: int) -> None:
-    try:
-        os.eventfd_read(wake_fd)
-    except BlockingIOError:
-        return
 
 
 class Interrupts:
@@ -348,9 +351,7 @@ class Interrupts:
         self._before[signal.SIGCHLD] = signal.signal(signal.SIGCHLD, self._wake)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for number, handler in self._before.items():
             signal.signal(number, handler)
         os.close(self.wake_fd)
