@@ -6,9 +6,9 @@ import pytest
 
 from paramove.bus import topics
 from paramove.documents.positions import DocumentError
-from paramove.supervision import launch_file, parameters
+from paramove.supervision import application, launch_file, parameters
 from paramove.supervision.interfaces import InterfaceError, read_interface
-from paramove.supervision.wiring import check_wiring, clock_publisher, read_interfaces
+from paramove.supervision.wiring import clock_publisher
 from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
@@ -23,15 +23,12 @@ NODES = [
 def checked(workspace, text):
     workspace.write(text)
     launch = workspace.load()
-    interfaces = read_interfaces(launch, workspace.folders)
-    check_wiring(launch, interfaces, workspace.folders)
-    return interfaces
+    return application.check(launch, workspace.folders)
 
 
 def test_topics_with_a_speaker_pass(workspace):
     interfaces = checked(workspace, "nodes: {robot: {module: nodes.actor}, ear: {module: nodes.listener}}")
     assert interfaces["ear"].subscribes == (topics.SPEECH,)
-    assert interfaces["ear"].parameters == ("loudness", "language")
     assert clock_publisher(interfaces) is None
 
 
@@ -148,18 +145,17 @@ def test_parameters_that_were_right_are_not_checked_again_until_the_code_changes
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     installed = Workspace.at(ROOT)
     launch = launch_file.load(installed, "pointing")
-    interfaces = read_interfaces(launch, installed)
     asked = []
     check = parameters._check_in_process
     monkeypatch.setattr(
         parameters, "_check_in_process", lambda *arguments: asked.append(arguments) or check(*arguments)
     )
     for _ in range(2):
-        check_wiring(launch, interfaces, installed)
+        application.check(launch, installed)
     assert len(asked) == 1
     wrong = launch_file.load(installed, "pointing", None, ["action_tracker.particles=0"])
     with pytest.raises(DocumentError, match="particles"):
-        check_wiring(wrong, interfaces, installed)
+        application.check(wrong, installed)
     monkeypatch.setattr(parameters, "code_digest", lambda *modules: "of changed code")
-    check_wiring(launch, interfaces, installed)
+    application.check(launch, installed)
     assert len(asked) == 3

@@ -12,25 +12,30 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from paramove.documents import raise_any
 from paramove.supervision.agent import release_of
 from paramove.supervision.distribution import distributed
 from paramove.supervision.domain import held_domain
 from paramove.supervision.environment import DEFAULT_DOMAIN, allow_open_files
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
+from paramove.supervision.parameters import wrong_parameters
 from paramove.supervision.remote_host import RemoteHost
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervisor import Outcome, Supervisor, View
-from paramove.supervision.wiring import check_wiring, clock_publisher, read_interfaces
+from paramove.supervision.wiring import clock_publisher, read_interfaces, topic_findings
 from paramove.workspace import Workspace
 
 _log = logging.getLogger(__name__)
 
 
 def check(launch: Launch, workspace: Workspace) -> dict[str, Interface]:
-    """Checks everything that can be checked before a process starts; returns the interfaces; raises DocumentError."""
+    """Checks everything that can be checked before a process starts; returns the interfaces.
+
+    Raises DocumentError with every error and its position in the launch file.
+    """
     interfaces = read_interfaces(launch, workspace)
-    check_wiring(launch, interfaces, workspace)
+    raise_any([*topic_findings(launch, interfaces), *wrong_parameters(launch, interfaces, workspace)])
     return interfaces
 
 

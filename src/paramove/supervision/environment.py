@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import resource
+import subprocess
 import sys
 import tempfile
 import zoneinfo
@@ -67,6 +68,22 @@ def node_environment(own: Mapping[str, str], workspace: Workspace) -> dict[str, 
     environment.pop("PYTHONSAFEPATH", None)
     path = [*map(str, workspace.folders[1:]), *filter(None, [own.get("PYTHONPATH")])]
     return {**environment, "PYTHONPATH": os.pathsep.join(path)} if path else environment
+
+
+def run_python(
+    *arguments: str, workspace: Workspace, timeout_s: float, stdin: str = ""
+) -> subprocess.CompletedProcess[str]:
+    """Runs Python as it runs the nodes of a workspace. Raises subprocess.TimeoutExpired."""
+    return subprocess.run(
+        [sys.executable, *arguments],
+        input=stdin,
+        cwd=workspace.root,
+        env=node_environment(os.environ, workspace),
+        capture_output=True,
+        text=True,
+        timeout=timeout_s,
+        check=False,
+    )
 
 
 def _unusable(folder: str) -> str:

@@ -1,4 +1,4 @@
-"""Topics and parameters of a node, read from its source without running it."""
+"""Topics of a node, and whether it needs parameters, read from its source without running it."""
 
 from __future__ import annotations
 
@@ -6,16 +6,14 @@ import ast
 import functools
 import importlib.util
 import json
-import os
 import subprocess
-import sys
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from paramove.bus import Topic, topics
-from paramove.supervision.environment import node_environment
+from paramove.supervision.environment import run_python
 from paramove.workspace import Workspace
 
 OLD_NAMES = {"SUBSCRIBES": "HEARS", "PUBLISHES": "SAYS"}
@@ -28,13 +26,12 @@ class InterfaceError(ValueError):
 
 @dataclass(frozen=True)
 class Interface:
-    """Topics and parameters of a node.
+    """Topics of a node, and what its source shows of its parameters.
 
     Attributes:
         path: Source file of the module.
         subscribes: Topics that it subscribes to.
         publishes: Topics that it publishes, without its status.
-        parameters: Names of its parameters; None where they cannot be read from the source.
         has_config: Whether it has a `Config` that can check parameters.
         needs_parameters: Whether some parameter may have no default value.
     """
@@ -42,9 +39,8 @@ class Interface:
     path: Path
     subscribes: tuple[Topic, ...]
     publishes: tuple[Topic, ...]
-    parameters: tuple[str, ...] | None
-    has_config: bool = False
-    needs_parameters: bool = False
+    has_config: bool
+    needs_parameters: bool
 
 
 def source_of(module: str, workspace: Workspace) -> Path:
@@ -85,15 +81,14 @@ def read_interface(module: str, workspace: Workspace) -> Interface:
         tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
     except SyntaxError as error:
         raise InterfaceError(f"{path}:{error.lineno}: {error.msg}") from error
-    config = _config(tree)
-    about = (_parameters(config), config is not None, config is not None and _needs_parameters(config))
+    config = next((line for line in tree.body if isinstance(line, ast.ClassDef) and line.name == "Config"), None)
     assigned = _assigned(tree)
     names = [_declared(name, assigned, path) for name in OLD_NAMES]
     try:
         subscribes, publishes = (_topics(assigned[name], assigned, path) for name in names)
     except _NotPlainError:
         subscribes, publishes = _imported(module, workspace, path.stat().st_mtime_ns, *names)
-    return Interface(path, subscribes, publishes, *about)
+    return Interface(path, subscribes, publishes, config is not None, config is not None and _needs_parameters(config))
 
 
 class _NotPlainError(Exception):
@@ -141,29 +136,11 @@ def _topics(expression: ast.expr, assigned: dict[str, ast.expr], path: Path) -> 
     raise _NotPlainError
 
 
-def _config(tree: ast.Module) -> ast.ClassDef | None:
-    return next((line for line in tree.body if isinstance(line, ast.ClassDef) and line.name == "Config"), None)
-
-
-def _is_plain(config: ast.ClassDef) -> bool:
-    return [ast.unparse(base) for base in config.bases] == ["NodeConfig"]
-
-
-def _parameters(config: ast.ClassDef | None) -> tuple[str, ...] | None:
-    if config is None or not _is_plain(config):
-        return None
-    fields = [line for line in config.body if isinstance(line, ast.AnnAssign)]
-    return tuple(field.target.id for field in fields if isinstance(field.target, ast.Name))
-
-
 def _needs_parameters(config: ast.ClassDef) -> bool:
     """Whether a field may lack a default: it has no value, or a `Field(...)` without one."""
-    if not _is_plain(config):
+    if [ast.unparse(base) for base in config.bases] != ["NodeConfig"]:
         return True
-    for line in config.body:
-        if not isinstance(line, ast.AnnAssign):
-            continue
-        value = line.value
+    for value in (line.value for line in config.body if isinstance(line, ast.AnnAssign)):
         if value is None:
             return True
         if isinstance(value, ast.Call) and ast.unparse(value.func).rpartition(".")[2] == "Field":
@@ -186,17 +163,8 @@ def _imported(
     module: str, workspace: Workspace, changed_ns: int, *names: str
 ) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
     """SUBSCRIBES and PUBLISHES of a module, imported in another process; again only when its file has changed."""
-    command = [sys.executable, "-c", _IMPORT_CODE, module, *names]
     try:
-        answer = subprocess.run(
-            command,
-            cwd=workspace.root,
-            env=node_environment(os.environ, workspace),
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-        )
+        answer = run_python("-c", _IMPORT_CODE, module, *names, workspace=workspace, timeout_s=60.0)
     except subprocess.TimeoutExpired as error:
         raise InterfaceError(f"importing '{module}' took more than 60 s") from error
     if answer.returncode != 0:

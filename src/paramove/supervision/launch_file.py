@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -240,12 +240,21 @@ _EXPECTED = {
 
 def _keys_at(path: KeyPath) -> list[str]:
     """Valid keys of the mapping at `path` of a launch file."""
-    model: type[BaseModel] = NodeSettings if path[:1] == ("nodes",) else LaunchFile
-    for key in path[2:] if model is NodeSettings else path:
-        field = model.model_fields.get(key)
-        inner = [kind for kind in (field.annotation, *get_args(field.annotation)) if field] if field else []
-        models = [kind for kind in inner if isinstance(kind, type) and issubclass(kind, BaseModel)]
-        if not models:
-            return []
-        model = models[0]
-    return list(model.model_fields)
+    return keys_at(NodeSettings, path[2:]) if path[:1] == ("nodes",) else keys_at(LaunchFile, path)
+
+
+def keys_at(kind: Any, path: Sequence[str]) -> list[str]:
+    """Valid keys of the mapping at `path` of a model or a dataclass; none where it holds no further one."""
+    for key in path:
+        inner = _fields(kind).get(key)
+        kind = next((candidate for candidate in (inner, *get_args(inner)) if _fields(candidate)), None)
+    return list(_fields(kind))
+
+
+def _fields(kind: Any) -> dict[str, Any]:
+    """Name -> type of the fields of a model or a dataclass."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return {name: field.annotation for name, field in kind.model_fields.items()}
+    if isinstance(kind, type) and is_dataclass(kind):
+        return {field.name: field.type for field in fields(kind)}
+    return {}

@@ -11,13 +11,12 @@ import contextlib
 import hashlib
 import importlib
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from platformdirs import user_cache_path
 from pydantic import BaseModel, ValidationError
@@ -25,9 +24,9 @@ from pydantic_core import ErrorDetails
 
 from paramove.documents import DocumentError, nearest
 from paramove.source_code import code_digest
-from paramove.supervision.environment import node_environment
+from paramove.supervision.environment import run_python
 from paramove.supervision.interfaces import Interface
-from paramove.supervision.launch_file import Launch
+from paramove.supervision.launch_file import Launch, keys_at
 from paramove.workspace import Workspace
 
 TIMEOUT_S = 120.0
@@ -87,16 +86,7 @@ def _message_of(node: str, parameter: str, finding: dict[str, Any]) -> str:
 def _check_in_process(to_check: Sequence[tuple[str, dict[str, Any]]], workspace: Workspace) -> tuple[list[Any], str]:
     """Answers of a process that imports the modules in turn, and how it ended if an answer is missing."""
     try:
-        answer = subprocess.run(
-            [sys.executable, "-m", __name__],
-            input=json.dumps(to_check),
-            cwd=workspace.root,
-            env=node_environment(os.environ, workspace),
-            capture_output=True,
-            text=True,
-            timeout=TIMEOUT_S,
-            check=False,
-        )
+        answer = run_python("-m", __name__, workspace=workspace, timeout_s=TIMEOUT_S, stdin=json.dumps(to_check))
     except subprocess.TimeoutExpired as error:
         output = error.stdout.decode() if error.stdout else ""
         return [json.loads(line) for line in output.splitlines()], f"it took more than {TIMEOUT_S:g} s"
@@ -126,32 +116,13 @@ def _finding(config: type[BaseModel], details: ErrorDetails) -> dict[str, Any]:
         "type": details["type"],
         "message": _message(details),
         "found": f"{details['input']!r:.200}",
-        "known": _keys_at(config, path[:-1]),
+        "known": keys_at(config, path[:-1]),
     }
 
 
 def _message(details: ErrorDetails) -> str:
     message = details["msg"].removeprefix("Value error, ")
     return message[:1].lower() + message[1:]
-
-
-def _keys_at(model: type[BaseModel], path: Sequence[str]) -> list[str]:
-    """Valid keys of the mapping at `path` of a Config; none where it is no model or dataclass."""
-    kind: Any = model
-    for key in path:
-        field = _fields(kind).get(key)
-        inner = [field, *get_args(field)]
-        kind = next((candidate for candidate in inner if _fields(candidate)), None)
-    return list(_fields(kind))
-
-
-def _fields(kind: Any) -> dict[str, Any]:
-    """Name -> type of the fields of a model or a dataclass."""
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        return {name: field.annotation for name, field in kind.model_fields.items()}
-    if isinstance(kind, type) and hasattr(kind, "__dataclass_fields__"):
-        return {name: field.type for name, field in kind.__dataclass_fields__.items()}
-    return {}
 
 
 def main() -> None:

@@ -15,8 +15,8 @@ def with_values(
     settings: Sequence[str],
     seed: int | None,
     headless: bool,
-    named: bool = True,
-    robot: str | None = None,
+    named: bool,
+    robot: str | None,
 ) -> tuple[Document, Findings]:
     """The document with the values that `--headless`, `--robot`, `--set` and `--seed` give, and the errors in these.
 
@@ -136,20 +136,13 @@ def _after(node: Any) -> list[str]:
     return [other for other in after if isinstance(other, str)] if isinstance(after, list) else []
 
 
-def _cycles(after: dict[str, list[str]]) -> list[list[str]]:
+def _cycles(after: dict[str, list[str]]) -> list[tuple[str, ...]]:
     """Nodes that wait for themselves, directly or through others; each cycle once, in the order of the file."""
-    reached: dict[str, set[str]] = {}
-    for name in after:
-        predecessors: set[str] = set()
-        waiting = list(after[name])
-        while waiting:
-            other = waiting.pop()
-            if other not in predecessors:
-                predecessors.add(other)
-                waiting += after.get(other, [])
-        reached[name] = predecessors
-    cycles: list[list[str]] = []
-    for name in after:
-        if name in reached[name] and not any(name in cycle for cycle in cycles):
-            cycles.append([other for other in after if other in reached[name] and name in reached.get(other, ())])
-    return cycles
+    before = {name: set(others) for name, others in after.items()}
+    for middle in after:  # Warshall's transitive closure
+        for name in after:
+            if middle in before[name]:
+                before[name] |= before[middle]
+    waiting = [name for name in after if name in before[name]]
+    cycles = [tuple(other for other in waiting if other in before[name] and name in before[other]) for name in waiting]
+    return list(dict.fromkeys(cycles))

@@ -37,19 +37,12 @@ def read_interfaces(launch: Launch, workspace: Workspace) -> dict[str, Interface
     return interfaces
 
 
-def check_wiring(launch: Launch, interfaces: Mapping[str, Interface], workspace: Workspace) -> None:
-    """Checks topics, parameters and access to ground truth.
+def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
+    """Errors of the clock, the topics and the hosts.
 
     Every topic with a subscriber has a publisher, no topic has two, only nodes with `truth: true` know a truth topic,
-    topics that the file names exist, and each node's own Config takes its parameters.
-
-    Raises DocumentError with every error and its position in the launch file.
+    and topics that the file names exist.
     """
-    raise_any([*topic_findings(launch, interfaces), *wrong_parameters(launch, interfaces, workspace)])
-
-
-def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
-    """Errors of the clock and the topics."""
     yield from _clock(launch, interfaces)
     yield from _publishers(launch, interfaces)
     yield from _subscribers(launch, interfaces)
@@ -60,20 +53,6 @@ def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Itera
 def clock_publisher(interfaces: Mapping[str, Interface]) -> str | None:
     """Node that publishes the clock; None where there is none."""
     return next((name for name, interface in interfaces.items() if CLOCK in interface.publishes), None)
-
-
-def unpublished(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[tuple[str, Topic]]:
-    """Each node with a topic that it subscribes to and that no node publishes; status topics come from every node.
-
-    Nor are those missing that relays publish, on several hosts.
-    """
-    published = {on_bus(launch, name, topic) for name, interface in interfaces.items() for topic in interface.publishes}
-    for name, interface in interfaces.items():
-        for topic in interface.subscribes:
-            subscribed = on_bus(launch, name, topic)
-            by_all = subscribed.startswith("status/") or topic in topics.BY_RELAYS
-            if subscribed not in published and not by_all:
-                yield name, topic
 
 
 def _clock(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
@@ -98,17 +77,24 @@ def _publishers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator
 
 
 def _subscribers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
+    published = {on_bus(launch, name, topic) for name, interface in interfaces.items() for topic in interface.publishes}
     for name, interface in interfaces.items():
+        node = launch.file.nodes[name]
         for topic in (*interface.subscribes, *interface.publishes):
-            if topic.truth and not launch.file.nodes[name].truth:
+            if topic.truth and not node.truth:
                 yield launch.error(("nodes", name), f"'{name}' uses {topic.name} but has no 'truth: true'")
-    for name, topic in unpublished(launch, interfaces):
-        if not any(fnmatchcase(topic.name, one) for one in launch.file.nodes[name].optional_topics):
-            yield launch.error(
-                ("nodes", name),
-                f"'{name}' subscribes to {on_bus(launch, name, topic)}, which no node of this launch file publishes; "
-                "add its publisher, or name it in 'optional_topics' of the node",
-            )
+        for topic in interface.subscribes:
+            subscribed = on_bus(launch, name, topic)
+            by_others = (
+                subscribed.startswith("status/") or topic in topics.BY_RELAYS
+            )  # by every node, or on several hosts
+            is_optional = any(fnmatchcase(topic.name, one) for one in node.optional_topics)
+            if not (subscribed in published or by_others or is_optional):
+                yield launch.error(
+                    ("nodes", name),
+                    f"'{name}' subscribes to {subscribed}, which no node of this launch file publishes; "
+                    "add its publisher, or name it in 'optional_topics' of the node",
+                )
 
 
 def _named_topics(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
