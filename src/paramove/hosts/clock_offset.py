@@ -32,7 +32,6 @@ class ClockOffset:
         low, high = there_ns - received_ns - drifted, there_ns - sent_ns + drifted
         before_low, before_high = self._interval(received_ns)
         if self._first_ns is not None and max(low, before_low) > min(high, before_high):
-            self.jumps += 1
             self._first_ns = None
         if self._first_ns is None:
             self._first_ns, self._reference = received_ns, None

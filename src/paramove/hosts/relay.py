@@ -98,6 +98,7 @@ class Relay:
             Offer(away, f"{endpoint}{settings.port + index}", own, settings.peers, f"relay {name}")
             for index, name in enumerate(("topics", "images"))
         )
+        self._foreign = [offer.foreign for offer in self._offers]
         self._real_time = bus.settings.clock == "monotonic"
         beat_s = BEAT_S if self._real_time else IMAGES_BEAT_S
         self._requests: dict[str, tuple[Request, Request]] = {}
@@ -114,34 +115,26 @@ class Relay:
                 Request(away, peer.port, own, peer, frozenset(peer.gives) - images, beat_s),
                 Request(away, peer.port + 1, own, peer, images),
             )
-        self._answers = _Answers(self._here, bus) if settings.clock_from else None
+        self._answers: _Answers | None = None
+        if settings.clock_from is not None:
+            self._answers = _Answers(self._here, bus)
+            self._foreign.append(self._answers.foreign)
+            self._owned.callback(self._answers.ownership.release)
         self._members: dict[str, zmq.Socket[Any]] = {}
         self._latest: dict[tuple[str, str], tuple[int, int]] = {}
         self._link = LinkState(hosts=sorted(host for host, peer in settings.peers.items() if peer.commands))
         self._confirmed_ns = 0
         self._look_due_s = self._detail_due_s = 0.0
         self.detail = ""
-        sockets = [source.socket for source in self._sources.values()] + [offer.socket for offer in self._offers]
-        sockets += [request.socket for request in self._each_request()]
-        for socket in [*sockets, *([self._answers.socket] if self._answers else [])]:
-            self._poller.register(socket, zmq.POLLIN)
+        ends: list[Subscriber | Offer | Request | _Answers] = [*self._ends(), *self._offers]
+        for end in [*ends, self._answers] if self._answers else ends:
+            self._poller.register(end.socket, zmq.POLLIN)
+            self._opened.callback(end.close)
 
     def __enter__(self) -> Relay:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for source in self._sources.values():
-            source.subscriber.close()
-        for publisher in self._publishers.values():
-            publisher.close()
-        for socket in self._members.values():
-            socket.close()
-        if self._answers is not None:
-            self._answers.close()
-        for request in self._each_request():
-            request.close()
-        for offer in self._offers:
-            offer.close()
         self._opened.close()
 
     @property
@@ -181,7 +174,7 @@ class Relay:
             if publisher.socket in ready:
                 publisher.serve()
         for source in self._sources.values():
-            for envelope, payload in source.messages() if source.socket in ready else ():
+            for envelope, payload in source.messages() if source.subscriber.socket in ready else ():
                 self._send_all(source, envelope, payload)
         for offer in self._offers:
             for asker, kind, frames, new in offer.requests() if offer.socket in ready else ():
@@ -204,30 +197,27 @@ class Relay:
     def _each_request(self) -> list[Request]:
         return [request for pair in self._requests.values() for request in pair]
 
+    def _ends(self) -> list[Subscriber | Request]:
+        """Those that receive, and that may have to be opened anew."""
+        return [*(source.subscriber for source in self._sources.values()), *self._each_request()]
+
     def _look_after(self) -> None:
         if time.monotonic() >= self._detail_due_s:
             self._detail_due_s, self.detail = time.monotonic() + 1.0, self._links()
-        ends: list[_Source | Request] = [*self._sources.values(), *self._each_request()]
-        for end in ends:
+        for end in self._ends():
             before = end.socket
             if end.revive():
                 self._poller.unregister(before)
                 self._poller.register(end.socket, zmq.POLLIN)
-        for publisher in self._publishers.values():
-            publisher.foreign.look()
-        if self._answers is not None:
-            self._answers.foreign.look()
+        for foreign in self._foreign:
+            foreign.look()
         for offer in self._offers:
-            offer.foreign.look()
             offer.forget_silent()
 
     # -- what others want ---------------------------------------------------------------------------------------------
 
-    def _offer_of(self, topic: Topic) -> Offer:
-        return self._offers[topic.is_image]
-
     def _send_all(self, source: _Source, envelope: Envelope, payload: bytes) -> None:
-        offer, is_image = self._offer_of(source.topic), source.topic.is_image and not envelope.is_welcome
+        offer, is_image = self._offers[source.topic.is_image], source.topic.is_image and not envelope.is_welcome
         frames = source.frames(envelope, payload)
         for asker in list(offer.askers.values()):
             if source.name not in asker.wanted:
@@ -261,6 +251,7 @@ class Relay:
         payload = answer.SerializeToString()
         if answer.node not in self._members:
             self._members[answer.node] = member_socket(self._here, self._bus.settings.folder, answer.node)
+            self._opened.callback(self._members[answer.node].close)
         with contextlib.suppress(zmq.Again):
             self._members[answer.node].send_multipart([pack(envelope, payload), payload], zmq.NOBLOCK)
 
@@ -295,6 +286,8 @@ class Relay:
         if name not in self._publishers:
             publisher = Publisher(self._here, self._bus.settings.folder, topic, self._bus.node, name)
             self._owned.callback(publisher.ownership.release)
+            self._opened.callback(publisher.close)
+            self._foreign.append(publisher.foreign)
             self._publishers[name] = publisher
             self._poller.register(publisher.socket, zmq.POLLIN)
         return self._publishers[name]
@@ -336,15 +329,6 @@ class _Source:
         self._known: tuple[int | None, int] = (None, 0)
         self._last: tuple[Envelope, bytes] | None = None
 
-    @property
-    def socket(self) -> zmq.Socket[Any]:
-        """Of the subscriber; another one after it was revived."""
-        return self.subscriber.socket
-
-    def revive(self) -> bool:
-        """See `Subscriber.revive`."""
-        return self.subscriber.revive()
-
     def frames(self, envelope: Envelope, payload: bytes) -> list[bytes]:
         """A message of the topic as it crosses."""
         return [self.name.encode() + b"\0" + pack(envelope, payload), payload]
@@ -380,7 +364,7 @@ class _Answers:
     """Answers of this host's members of lockstep, whose simulator runs on another host."""
 
     def __init__(self, context: zmq.Context[Any], bus: Bus) -> None:
-        self.socket, self._ownership, self.foreign = answers_socket(
+        self.socket, self.ownership, self.foreign = answers_socket(
             context, bus.settings.folder, bus.node, MAX_ASKED_BYTES
         )
         self._pidfds: dict[str, tuple[int, int]] = {}
@@ -417,9 +401,8 @@ class _Answers:
             os.close(self._pidfds.pop(node)[1])
 
     def close(self) -> None:
-        """Closes the socket, and gives its path up."""
+        """Closes the socket; its path may be given up when its context has ended."""
         for node in list(self._pidfds):
             self._forget(node)
         self.foreign.close()
         self.socket.close()
-        self._ownership.release()
