@@ -7,11 +7,11 @@ A file names its schema in a comment: `# yaml-language-server: $schema=launch.sc
 
 from __future__ import annotations
 
-import copy
 import json
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
+from pydantic.json_schema import GenerateJsonSchema
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 FILES = {"launch": "launch.schema.json", "overlay": "overlay.schema.json"}
@@ -151,16 +151,24 @@ def schema_as_text(schema: dict[str, Any]) -> str:
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
+class _Untitled(GenerateJsonSchema):
+    """Fields without the titles that pydantic makes of their names; they add nothing."""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+
 def _launch() -> dict[str, Any]:
-    schema = LaunchFile.model_json_schema()
-    _without_titles(schema)
+    schema = LaunchFile.model_json_schema(schema_generator=_Untitled)
+    for model in (schema, *schema["$defs"].values()):
+        del model["title"]  # the name of its class
     schema["properties"]["nodes"]["additionalProperties"] = False  # names that do not fit the pattern
     return {"$schema": DIALECT, "title": "paramove launch file", **schema}
 
 
 def _overlay() -> dict[str, Any]:
     """The launch file's schema with every key optional; null removes a key of the file below."""
-    schema = copy.deepcopy(_launch())
+    schema = _launch()
     schema["title"] = "paramove overlay"
     schema["description"] = "Laid over a launch file: mappings merge, all else is replaced, null removes a key."
     del schema["properties"]["default_overlays"]
@@ -180,15 +188,3 @@ def _or_null(field: dict[str, Any]) -> dict[str, Any]:
     choices = field.get("anyOf", [field])
     about["anyOf"] = choices if {"type": "null"} in choices else [*choices, {"type": "null"}]
     return about
-
-
-def _without_titles(schema: Any) -> None:
-    """Removes the titles that pydantic makes of the names of fields; they add nothing."""
-    if isinstance(schema, dict):
-        if isinstance(schema.get("title"), str):
-            del schema["title"]
-        for value in schema.values():
-            _without_titles(value)
-    elif isinstance(schema, list):
-        for value in schema:
-            _without_titles(value)

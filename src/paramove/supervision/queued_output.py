@@ -11,7 +11,6 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from types import TracebackType
 from typing import Self, TextIO
 
 LONGEST_QUEUE = 256
@@ -46,9 +45,7 @@ class QueuedOutput:
         self._writer.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._put(None)
         with suppress(KeyboardInterrupt):  # Ctrl-C skips the rest
             self._writer.join(LAST_WAIT_S)
