@@ -62,12 +62,12 @@ def run(
         folder = RunFolder.create((runs or workspace.root / "runs").resolve(), begun)
         folder.write_effective(launch)
         folder.write_configs(launch, domain.folder, domain.truth_folder, clock)
-        facts = _facts(launch, workspace, domain.name, begun)
+        facts = _facts(launch, workspace, name, begun)
         if launch.file.bus.clock == "monotonic":
             facts["begun_ns"] = folder.begun_ns
         folder.write_run(facts)
         with contextlib.ExitStack() as connected:
-            hosts = _remote_hosts(launch, workspace, folder, domain.name, clock, connected)
+            hosts = _remote_hosts(launch, workspace, folder, name, clock, connected)
             supervisor = Supervisor(launch, workspace, folder, domain, make_view(folder), hosts)
             outcome = supervisor.run()
         ended = datetime.datetime.now().astimezone()

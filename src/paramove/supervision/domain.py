@@ -32,12 +32,10 @@ class Domain:
     """Folders of sockets.
 
     Attributes:
-        name: Of the domain, `default` unless PARAMOVE_DOMAIN is set.
         folder: Sockets of the bus.
         truth_folder: Sockets of the ground truth; has a random name below a folder that cannot be listed (mode 0300).
     """
 
-    name: str
     folder: Path
     truth_folder: Path
 
@@ -92,7 +90,7 @@ def held_domain(name: str, holder: str) -> Iterator[Domain]:
         try:
             folder.mkdir(mode=0o700)
             hidden.mkdir(mode=0o300)
-            yield Domain(name, folder, Path(tempfile.mkdtemp(prefix="", dir=hidden)))
+            yield Domain(folder, Path(tempfile.mkdtemp(prefix="", dir=hidden)))
         finally:
             _remove(folder, hidden)
             lock.truncate(0)

@@ -49,8 +49,8 @@ def examined(variables: Mapping[str, str], workspace: Path) -> Environment:
     check_name(domain)
     sockets = default_folder(domain)
     notes = [
-        *_runtime_folder(variables, sockets),
-        *_temporary_folder(variables),
+        *_ignored_folder(variables, "XDG_RUNTIME_DIR", f"sockets lie in {sockets}"),
+        *_ignored_folder(variables, "TMPDIR", f"temporary files lie in {tempfile.gettempdir()}"),
         *_cache_folder(variables),
         *_time_zone(variables),
         *_hidden_modules(variables, workspace),
@@ -97,18 +97,10 @@ def _unusable(folder: str) -> str:
     return ""
 
 
-def _runtime_folder(variables: Mapping[str, str], sockets: Path) -> Iterator[str]:
-    value = variables.get("XDG_RUNTIME_DIR", "")
-    reason = _unusable(value) if value else ""
-    if reason:
-        yield f"XDG_RUNTIME_DIR={value!r} is ignored: {reason}; sockets lie in {sockets}. Unset it or correct it"
-
-
-def _temporary_folder(variables: Mapping[str, str]) -> Iterator[str]:
-    value = variables.get("TMPDIR", "")
-    reason = _unusable(value) if value else ""
-    if reason:
-        yield f"TMPDIR={value!r} is ignored: {reason}; temporary files lie in {tempfile.gettempdir()}. Unset it"
+def _ignored_folder(variables: Mapping[str, str], name: str, instead: str) -> Iterator[str]:
+    value = variables.get(name, "")
+    if value and (reason := _unusable(value)):
+        yield f"{name}={value!r} is ignored: {reason}; {instead}. Unset it or correct it"
 
 
 def _cache_folder(variables: Mapping[str, str]) -> Iterator[str]:

@@ -8,8 +8,8 @@ line crosses a text, whatever the graph.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from xml.sax.saxutils import escape
+from dataclasses import dataclass
+from xml.sax.saxutils import escape, quoteattr
 
 from paramove.supervision.graph import Edge, Graph
 
@@ -36,36 +36,43 @@ _STYLE = """
 """
 
 
-@dataclass
+@dataclass(frozen=True)
+class _Box:
+    """Column and row of a node; its box lies in their middle. Lengths in px."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Of the box, x and y."""
+        return self.left + self.width / 2, self.top + self.height / 2
+
+
+@dataclass(frozen=True)
 class _Chart:
-    """Layout: columns and rows of the chart, and the text of each cell."""
+    """Layout: the box of each node, from the upper left on, and the text of each cell (publisher, subscriber)."""
 
     graph: Graph
-    names: list[str]
-    cells: dict[tuple[str, str], list[str]] = field(default_factory=dict)
-    left: dict[str, float] = field(default_factory=dict)
-    width: dict[str, float] = field(default_factory=dict)
-    top: dict[str, float] = field(default_factory=dict)
-    height: dict[str, float] = field(default_factory=dict)
-
-    def middle(self, name: str) -> tuple[float, float]:
-        """Middle of a node's box, x and y."""
-        return self.left[name] + self.width[name] / 2, self.top[name] + self.height[name] / 2
+    boxes: dict[str, _Box]
+    cells: dict[tuple[str, str], list[str]]
 
 
 def as_svg(graph: Graph) -> str:
     """The graph as an SVG document."""
     chart = _laid_out(graph)
-    last = chart.names[-1] if chart.names else ""
-    width = chart.left.get(last, 300.0) + chart.width.get(last, 0.0) + MARGIN_PX
-    height = chart.top.get(last, TITLE_PX) + chart.height.get(last, 0.0) + MARGIN_PX + LINE_PX
+    last = list(chart.boxes.values())[-1] if chart.boxes else _Box(300.0, TITLE_PX, 0.0, 0.0)
+    width = last.left + last.width + MARGIN_PX
+    height = last.top + last.height + MARGIN_PX + LINE_PX
     body = [*_lines(chart), *_labels(chart), *_boxes(chart)]
     remark = "right and down: onwards; left and up (brown): back; dashed: collected, or without publisher (red)"
     remark += "".join(f"; {escape(topic)}: to all nodes" for topic in sorted(graph.to_all))
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
-            f'width="{width:.0f}" height="{height:.0f}" role="img" aria-label="{_attribute(graph.title)}">',
+            f'width="{width:.0f}" height="{height:.0f}" role="img" aria-label={quoteattr(graph.title)}>',
             f"<style>{_STYLE}</style>",
             '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" '
             'orient="auto"><path d="M0 0 L8 4 L0 8 z" fill="context-stroke"/></marker></defs>',
@@ -80,22 +87,18 @@ def as_svg(graph: Graph) -> str:
 
 def _laid_out(graph: Graph) -> _Chart:
     names = [*([NO_PUBLISHER] if graph.unpublished else []), *graph.nodes]
-    chart = _Chart(graph, names)
-    for publisher in names:
-        for subscriber in names:
-            found = _written(graph, publisher, subscriber)
-            if found and publisher != subscriber:
-                chart.cells[publisher, subscriber] = found
-    x, y = MARGIN_PX, TITLE_PX
+    pairs = ((publisher, subscriber) for publisher in names for subscriber in names if publisher != subscriber)
+    cells = {pair: lines for pair in pairs if (lines := _written(graph, *pair))}
+    boxes = {}
+    left, top = MARGIN_PX, TITLE_PX
     for name in names:
-        column = [line for (_, subscriber), lines in chart.cells.items() if subscriber == name for line in lines]
-        row = [len(lines) for (publisher, _), lines in chart.cells.items() if publisher == name]
-        chart.left[name], chart.top[name] = x, y
-        chart.width[name] = LETTER_PX * max(1.25 * len(name), *map(len, column), 8) + 2 * PAD_PX
-        chart.height[name] = max(BOX_PX, LINE_PX * max(row, default=0)) + 2 * PAD_PX
-        x += chart.width[name]
-        y += chart.height[name]
-    return chart
+        column = [line for (_, subscriber), lines in cells.items() if subscriber == name for line in lines]
+        row = [len(lines) for (publisher, _), lines in cells.items() if publisher == name]
+        width = LETTER_PX * max(1.25 * len(name), *map(len, column), 8) + 2 * PAD_PX
+        height = max(BOX_PX, LINE_PX * max(row, default=0)) + 2 * PAD_PX
+        boxes[name] = _Box(left, top, width, height)
+        left, top = left + width, top + height
+    return _Chart(graph, boxes, cells)
 
 
 def _written(graph: Graph, publisher: str, subscriber: str) -> list[str]:
@@ -122,16 +125,16 @@ def _kind(chart: _Chart, publisher: str, subscriber: str) -> str:
         return "line unpublished"
     if subscriber in chart.graph.collectors:
         return "line collected"
-    return "line back" if chart.names.index(subscriber) < chart.names.index(publisher) else "line"
+    return "line back" if chart.boxes[subscriber].left < chart.boxes[publisher].left else "line"
 
 
 def _lines(chart: _Chart) -> Iterator[str]:
     """From the side of one box along its row, then along the column of the other to its upper or lower edge."""
     for publisher, subscriber in sorted(chart.cells, key=lambda cell: cell[1] not in chart.graph.collectors):
-        from_x, from_y = chart.middle(publisher)
-        to_x, to_y = chart.middle(subscriber)
+        from_x, from_y = chart.boxes[publisher].middle
+        to_x, to_y = chart.boxes[subscriber].middle
         onwards = to_x > from_x
-        start = from_x + (1 if onwards else -1) * (chart.width[publisher] / 2 - PAD_PX / 2)
+        start = from_x + (1 if onwards else -1) * (chart.boxes[publisher].width / 2 - PAD_PX / 2)
         end = to_y - (1 if onwards else -1) * (BOX_PX / 2 + 1)
         yield (
             f'<path class="{_kind(chart, publisher, subscriber)}" marker-end="url(#tip)" '
@@ -141,8 +144,8 @@ def _lines(chart: _Chart) -> Iterator[str]:
 
 def _labels(chart: _Chart) -> Iterator[str]:
     for (publisher, subscriber), lines in chart.cells.items():
-        x, _ = chart.middle(subscriber)
-        _, y = chart.middle(publisher)
+        x, _ = chart.boxes[subscriber].middle
+        _, y = chart.boxes[publisher].middle
         wide = LETTER_PX * max(map(len, lines)) + 4
         high = LINE_PX * len(lines)
         yield (
@@ -157,9 +160,9 @@ def _labels(chart: _Chart) -> Iterator[str]:
 
 
 def _boxes(chart: _Chart) -> Iterator[str]:
-    for name in chart.names:
-        x, y = chart.middle(name)
-        wide = chart.width[name] - PAD_PX
+    for name, box in chart.boxes.items():
+        x, y = box.middle
+        wide = box.width - PAD_PX
         kind = "nobody" if name == NO_PUBLISHER else "collector" if name in chart.graph.collectors else "box"
         yield (
             f'<rect class="{kind}" x="{x - wide / 2:.1f}" y="{y - BOX_PX / 2:.1f}" width="{wide:.1f}" '
@@ -169,7 +172,3 @@ def _boxes(chart: _Chart) -> Iterator[str]:
         yield f'<text class="node" x="{x:.1f}" y="{y + (4 if not about else -1):.1f}">{escape(name)}</text>'
         if about:
             yield f'<text class="about" x="{x:.1f}" y="{y + 11:.1f}">{escape(about)}</text>'
-
-
-def _attribute(text: str) -> str:
-    return escape(text, {'"': "&quot;"})

@@ -8,10 +8,9 @@ import signal
 import subprocess
 import sys
 import threading
-from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import IO, Self
+from typing import Self
 
 import psutil
 
@@ -181,12 +180,8 @@ def last_lines(file: Path, count: int) -> list[str]:
     """The last `count` lines of a text file, with control characters written out; [] if it cannot be read."""
     try:
         with file.open("rb") as opened:
-            return [printable(line) for line in deque(_decoded(opened), maxlen=count)]
+            opened.seek(max(0, file.stat().st_size - 100_000))
+            lines = opened.read().decode("utf-8", errors="replace").splitlines()
     except OSError:
         return []
-
-
-def _decoded(opened: IO[bytes]) -> list[str]:
-    opened.seek(0, os.SEEK_END)
-    opened.seek(max(0, opened.tell() - 100_000))
-    return opened.read().decode("utf-8", errors="replace").splitlines()
+    return [printable(line) for line in lines[-count:]]
