@@ -155,17 +155,18 @@ class LimitError(RuntimeError):
     """The operating system allows less than a run needs; the text has the command that raises the limit."""
 
 
-def allow_open_files(needed: int = OPEN_FILES) -> None:
+def allow_open_files() -> None:
     """Raises this process's limit of open files if it is too low; nodes inherit it.
 
     Raises LimitError if the hard limit, which only a privileged user raises, is too low.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft == resource.RLIM_INFINITY or soft >= needed:
+    if soft == resource.RLIM_INFINITY or soft >= OPEN_FILES:
         return
-    if hard != resource.RLIM_INFINITY and hard < needed:
+    if hard != resource.RLIM_INFINITY and hard < OPEN_FILES:
         raise LimitError(
-            f"a process may have {soft} files open here (hard limit {hard}), a run needs {needed}; raise the limit: "
-            f"`ulimit -Hn {needed}` as root, `nofile` in /etc/security/limits.conf, or LimitNOFILE= of the service"
+            f"a process may have {soft} files open here (hard limit {hard}), a run needs {OPEN_FILES}; raise the "
+            f"limit: `ulimit -Hn {OPEN_FILES}` as root, `nofile` in /etc/security/limits.conf, or LimitNOFILE= of "
+            "the service"
         )
-    resource.setrlimit(resource.RLIMIT_NOFILE, (needed, hard))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (OPEN_FILES, hard))

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from paramove.bus import CLOCK, Topic, inspection, topics
 from paramove.supervision.distribution import on_bus
@@ -94,11 +93,11 @@ def running_graph(folder: Path, domain: str, seconds: float) -> Graph:
     subscribers: dict[str, list[str]] = {}
     states: dict[str, str] = {}
     for node, status in inspection.statuses(folder, 2.0).items():
-        states[node] = _state(status)
-        for by_topic, counts in (
-            (publishers, status.published if status else ()),
-            (subscribers, status.received if status else ()),
-        ):
+        if status is None:
+            states[node] = "not responding"
+            continue
+        states[node] = status.State.Name(status.state).removeprefix("STATE_").lower()
+        for by_topic, counts in ((publishers, status.published), (subscribers, status.received)):
             for count in counts:
                 if not count.topic.startswith("status/"):
                     by_topic.setdefault(count.topic, []).append(node)
@@ -109,12 +108,6 @@ def running_graph(folder: Path, domain: str, seconds: float) -> Graph:
     rates = {item.topic.name: item.rate_hz if item.topic.rate_hz else None for item in measured}
     to_all = {CLOCK.name} if CLOCK.name in publishers else set()
     return _graph(f"domain {domain}", states, publishers, subscribers, rates, to_all)
-
-
-def _state(status: Any) -> str:
-    if status is None:
-        return "not responding"
-    return str(type(status).State.Name(status.state)).removeprefix("STATE_").lower()
 
 
 def _graph(

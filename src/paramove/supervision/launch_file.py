@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -24,9 +24,9 @@ from paramove.documents import (
     raise_any,
     read_mapping,
     read_text,
+    read_value,
 )
 from paramove.supervision.launch_schema import LaunchFile, NodeSettings
-from paramove.supervision.references import with_values, wrong_references
 from paramove.workspace import Workspace
 
 _QUOTED = re.compile(r"'([^']*)'")
@@ -84,12 +84,12 @@ def load(
     path = _typed(workspace, (_FOLDER,), name, "launch file")
     document, chosen = _with_overlays(workspace, path.stem, _read(path), overlays, robot)
     given = [topics.present_names(setting) for setting in settings]
-    document, findings = with_values(document, given, seed, headless, overlays is not None, robot)
+    document, findings = _with_values(document, given, seed, headless, overlays is not None, robot)
     try:
         file = validated(document)
     except DocumentError as error:
         findings.append(error)
-    findings += wrong_references(document)
+    findings += _wrong_references(document)
     raise_any(findings)
     return Launch(Path(name).stem, tuple(chosen), file, document, seed, headless)
 
@@ -133,6 +133,138 @@ def _with_overlays(
         document = document.overlaid(top)
     raise_any(findings)
     return document, chosen
+
+
+def _with_values(
+    document: Document,
+    settings: Sequence[str],
+    seed: int | None,
+    headless: bool,
+    named: bool,
+    robot: str | None,
+) -> tuple[Document, list[DocumentError]]:
+    """The document with the values that `--headless`, `--robot`, `--set` and `--seed` give, and the errors in these.
+
+    Args:
+        document: Launch file with its overlays.
+        settings: Each `node.parameter=value`; the value is YAML.
+        seed: Written into each of the file's `seed_parameters`.
+        headless: Sets the parameters that the file names under `headless`, before `settings`.
+        named: Whether the overlays were named by `--with`.
+        robot: Written into the parameter `robot` of each node for which the files give one, before `settings`.
+    """
+    findings: list[DocumentError] = []
+    values: list[tuple[str, Any, Position]] = []
+    if headless:
+        for target, value in _mapping_at(document, "headless").items():
+            values.append((target, value, document.position(("headless", target))))
+    if robot is not None:
+        where = Position(f"--robot {robot}")
+        robots = [node for node in _mapping_at(document, "nodes") if _value_at(document, node, ["robot"]) is not None]
+        if not robots:
+            findings.append(DocumentError(where, "no node of this launch file names a robot, so none can be replaced"))
+        values += [(f"{node}.robot", robot, where) for node in robots]
+    for setting in settings:
+        where = Position(f"--set {setting}")
+        target, equals, text = setting.partition("=")
+        if not equals or not all(target.strip().split(".")) or "." not in target:
+            findings.append(DocumentError(where, "expected node.parameter=value, such as simulator.seed=7"))
+            continue
+        try:
+            values.append((target.strip(), read_value(text, str(where)), where))
+        except DocumentError as error:
+            findings.append(error)
+    if seed is not None:
+        where = Position(f"--seed {seed}")
+        targets = _list_at(document, "seed_parameters")
+        if not targets:
+            message = "this launch file has no 'seed_parameters', so nothing in it takes a seed"
+            findings.append(DocumentError(where, message))
+        values += [(str(target), seed, where) for target in targets]
+    for target, value, where in values:
+        node, *parameters = target.split(".")
+        nodes = _mapping_at(document, "nodes")
+        if node not in nodes:
+            findings.append(DocumentError(where, f"there is no node '{node}'; {nearest(node, nodes)}"))
+        elif (
+            where.source.startswith("--set")
+            and target in _list_at(document, "connections")
+            and not (named and _value_at(document, node, parameters))
+        ):
+            message = f"select an overlay that sets what is connected there, such as --with real --set {target}=..."
+            findings.append(DocumentError(where, message))
+        elif all(parameters) and parameters:  # otherwise `_wrong_references` reports it
+            document = document.overlaid(_parameter(node, parameters, value, where))
+    return document, findings
+
+
+def _mapping_at(document: Document, key: str) -> dict[str, Any]:
+    """A mapping at the top level; empty where there is something else, which `validated` reports."""
+    value = document.data.get(key)
+    return value if isinstance(value, dict) else {}
+
+
+def _list_at(document: Document, key: str) -> list[Any]:
+    """A list at the top level, likewise."""
+    value = document.data.get(key)
+    return value if isinstance(value, list) else []
+
+
+def _value_at(document: Document, node: str, parameters: Sequence[str]) -> Any:
+    value: Any = _mapping_at(document, "nodes")[node]
+    for key in ("parameters", *parameters):
+        value = value.get(key) if isinstance(value, dict) else None
+    return value
+
+
+def _parameter(node: str, parameters: Sequence[str], value: Any, where: Position) -> Document:
+    path = ("nodes", node, "parameters", *parameters)
+    data: Any = value
+    for key in reversed(path):
+        data = {key: data}
+    return Document(data, {path: where})
+
+
+def _wrong_references(document: Document) -> Iterator[DocumentError]:
+    """References to missing names, and cycles of `after`; works on a file with other errors, too."""
+    nodes = _mapping_at(document, "nodes")
+    after = {name: _after(node) for name, node in nodes.items()}
+    for name, others in after.items():
+        for index, other in enumerate(others):
+            if other not in nodes:
+                message = f"'{name}' is started after '{other}', which is not a node; {nearest(other, nodes)}"
+                yield document.error(("nodes", name, "after", str(index)), message)
+    for cycle in _cycles(after):
+        message = f"these nodes wait for each other ('after'): {', '.join(cycle)}"
+        yield document.error(("nodes", cycle[0], "after"), message)
+    targets: list[tuple[str, str, Any]] = [
+        (key, str(index), target)
+        for key in ("seed_parameters", "connections")
+        for index, target in enumerate(_list_at(document, key))
+    ]
+    targets += [("headless", target, target) for target in _mapping_at(document, "headless")]
+    for key, index_or_name, target in targets:
+        node, *parameters = str(target).split(".")
+        if node not in nodes or not parameters or not all(parameters):
+            remedy = f"write {node}.<parameter>" if node in nodes else nearest(node, nodes)
+            yield document.error((key, index_or_name), f"'{target}' is not a node.parameter; {remedy}")
+
+
+def _after(node: Any) -> list[str]:
+    after = node.get("after") if isinstance(node, dict) else None
+    return [other for other in after if isinstance(other, str)] if isinstance(after, list) else []
+
+
+def _cycles(after: dict[str, list[str]]) -> list[tuple[str, ...]]:
+    """Nodes that wait for themselves, directly or through others; each cycle once, in the order of the file."""
+    before = {name: set(others) for name, others in after.items()}
+    for middle in after:  # Warshall's transitive closure
+        for name in after:
+            if middle in before[name]:
+                before[name] |= before[middle]
+    waiting = [name for name in after if name in before[name]]
+    cycles = [tuple(other for other in waiting if other in before[name] and name in before[other]) for name in waiting]
+    return list(dict.fromkeys(cycles))
 
 
 def validated(document: Document) -> LaunchFile:
@@ -189,11 +321,7 @@ def _typed(workspace: Workspace, folders: Sequence[Path], name: str, kind: str) 
         raise LaunchFileMissingError(
             Position(name), f"not a name of a {kind}: expected letters, digits, '_', or a *.yaml"
         )
-    try:
-        exists = path.is_file()
-    except ValueError:  # a NUL byte in it
-        exists = False
-    if not exists:
+    if not path.is_file():
         message = f"there is no such {kind}; {nearest(path.stem, _known(workspace, folders))}"
         raise LaunchFileMissingError(Position(str(path)), message)
     return path
