@@ -7,6 +7,7 @@ import json
 import select
 import subprocess
 import time
+from collections.abc import Callable
 from typing import Any
 
 from paramove.documents import InputError
@@ -42,7 +43,8 @@ class RemoteHost:
         self.name, self.lost = name, ""
         self._folder = folder
         self._processes: dict[str, RemoteProcess] = {}
-        self._answers: dict[str, dict[str, Any]] = {}
+        self._failed: dict[str, str] = {}
+        self._answers: dict[str, str] = {}
         with folder.log(f"agent_{name}").open("ab") as log:
             self._process = subprocess.Popen(
                 ssh_command(settings, "host", "agent"),
@@ -55,14 +57,10 @@ class RemoteHost:
         self._lines = Lines(self._process.stdout.fileno())
         self._latest_s = self._alive_due_s = time.monotonic()
         self._begin: dict[str, Any] | None = {**begin, "host": name}
-        end_s = time.monotonic() + BEGIN_S
-        while "ready" not in self._answers and not self.lost and time.monotonic() < end_s:
-            select.select([self.descriptor], [], [], ALIVE_S)
-            self._latest_s = time.monotonic()
-            self.serve()
+        self._serve_until(lambda: "ready" in self._answers, BEGIN_S)
         if "ready" not in self._answers:
             self.close()
-            why = self._answers.get("rejected", {}).get("rejected") or self.lost or f"no answer within {BEGIN_S:g} s"
+            why = self._answers.get("rejected") or self.lost or f"no answer within {BEGIN_S:g} s"
             raise InputError(f"{name} ({settings.ssh}) does not take part: {why}; see {folder.log(f'agent_{name}')}")
 
     @property
@@ -76,26 +74,30 @@ class RemoteHost:
         for line in self._lines.read():
             self._latest_s = now_s
             self._take(line)
-        if not self.lost and (self._lines.ended or now_s - self._latest_s > SILENT_S):
-            self.lost = "its agent has ended" if self._lines.ended else f"it is silent for {SILENT_S:g} s"
+        if self._lines.ended:
+            self.lost = self.lost or "its agent has ended"
+        elif "ready" in self._answers and now_s - self._latest_s > SILENT_S:
+            self.lost = self.lost or f"it is silent for {SILENT_S:g} s"
         if self._begin is None and not self.lost and now_s >= self._alive_due_s:
             self._alive_due_s = now_s + ALIVE_S
             self.send()
 
     def start(self, node: str) -> RemoteProcess:
         """Starts a node's process there. Raises OSError if that fails."""
-        self._answers.pop(node, None)
+        self._processes.pop(node, None)
+        self._failed.pop(node, None)
         self.send(start=node)
-        end_s = time.monotonic() + START_S
-        while node not in self._answers and not self.lost and time.monotonic() < end_s:
+        self._serve_until(lambda: node in self._processes or node in self._failed, START_S)
+        if node not in self._processes:
+            why = self._failed.get(node) or self.lost or f"no answer within {START_S:g} s"
+            raise OSError(0, f"{self.name}: {why}")
+        return self._processes[node]
+
+    def _serve_until(self, is_answered: Callable[[], bool], timeout_s: float) -> None:
+        end_s = time.monotonic() + timeout_s
+        while not (is_answered() or self.lost) and time.monotonic() < end_s:
             select.select([self.descriptor], [], [], ALIVE_S)
             self.serve()
-        answer = self._answers.get(node, {})
-        if "pid" not in answer:
-            raise OSError(0, f"{self.name}: {answer.get('reason') or self.lost or f'no answer within {START_S:g} s'}")
-        process = RemoteProcess(self, node, int(answer["pid"]))
-        self._processes[node] = process
-        return process
 
     def send(self, **content: Any) -> None:
         """Sends one line."""
@@ -122,14 +124,15 @@ class RemoteHost:
             self._begin = None
         for word in ("ready", "rejected"):
             if word in line:
-                self._answers[word] = line
-        for word in ("started", "failed"):
-            if word in line:
-                self._answers[str(line[word])] = line
-        if (name := str(line.get("log"))) in self._answers:
+                self._answers[word] = str(line[word])
+        if "started" in line:
+            self._processes[line["started"]] = RemoteProcess(self, line["started"], int(line["pid"]))
+        if "failed" in line:
+            self._failed[line["failed"]] = str(line["reason"])
+        if (name := line.get("log")) in self._processes:
             with self._folder.log(name).open("a", encoding="utf-8") as file:
-                file.write(str(line.get("text", "")))
-        process = self._processes.get(str(line.get("ended", line.get("halted", ""))))
+                file.write(str(line["text"]))
+        process = self._processes.get(line.get("ended", line.get("halted", "")))
         if process is not None and "ended" in line:
             process.code = int(line["code"])
         elif process is not None:
