@@ -30,10 +30,7 @@ _log = logging.getLogger(__name__)
 
 
 def check(launch: Launch, workspace: Workspace) -> dict[str, Interface]:
-    """Checks everything that can be checked before a process starts; returns the interfaces.
-
-    Raises DocumentError with every error and its position in the launch file.
-    """
+    """Checks everything that can be checked before a process starts; returns the interfaces; raises DocumentError."""
     interfaces = read_interfaces(launch, workspace)
     raise_any([*topic_findings(launch, interfaces), *wrong_parameters(launch, interfaces, workspace)])
     return interfaces
@@ -68,7 +65,7 @@ def run(
         folder.write_run(facts)
         with contextlib.ExitStack() as connected:
             hosts = _remote_hosts(launch, workspace, folder, name, clock, connected)
-            supervisor = Supervisor(launch, workspace, folder, domain, make_view(folder), hosts)
+            supervisor = Supervisor(launch, workspace, folder, domain.folder, make_view(folder), hosts)
             outcome = supervisor.run()
         ended = datetime.datetime.now().astimezone()
         facts["outcome"] = {

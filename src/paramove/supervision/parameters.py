@@ -31,33 +31,31 @@ from paramove.workspace import Workspace
 
 TIMEOUT_S = 120.0
 """For importing the modules, on a busy machine with cold caches."""
+_ToCheck = tuple[str, str, dict[str, Any]]
+"""Node, module, parameters."""
 
 
 def wrong_parameters(
     launch: Launch, interfaces: Mapping[str, Interface], workspace: Workspace
 ) -> Iterator[DocumentError]:
     """Parameters that the nodes' own Config rejects, and modules that cannot be imported."""
-    to_check = {
-        name: (launch.file.nodes[name].module, launch.file.nodes[name].parameters)
+    to_check = [
+        (name, launch.file.nodes[name].module, launch.file.nodes[name].parameters)
         for name, interface in interfaces.items()
         if interface.has_config and (launch.file.nodes[name].parameters or interface.needs_parameters)
-    }
+    ]
     if not to_check:
         return
     passed = _passed_before(to_check, interfaces, workspace)
     if passed is not None and passed.is_file():
         return
-    answers, ending = _check_in_process(list(to_check.values()), workspace)
-    for (name, (module, _)), answer in zip(to_check.items(), answers, strict=False):
+    answers = _check_in_process(to_check, workspace)
+    for (name, module, _), answer in zip(to_check, answers, strict=False):
         if isinstance(answer, str):
             yield launch.error(("nodes", name, "module"), f"'{module}' cannot be imported: {answer}")
             continue
-        for finding in answer:
-            path = ("nodes", name, "parameters", *finding["path"])
-            yield launch.error(path, _message_of(name, ".".join(finding["path"]), finding))
-    if len(answers) < len(to_check):
-        name, (module, _) = list(to_check.items())[len(answers)]
-        yield launch.error(("nodes", name, "module"), f"'{module}' cannot be imported: {ending}")
+        for path, message in answer:
+            yield launch.error(("nodes", name, "parameters", *path), message)
     if passed is not None and answers == [[]] * len(to_check):
         with contextlib.suppress(OSError):  # not writable: the next launch checks again
             passed.parent.mkdir(parents=True, exist_ok=True)
@@ -65,37 +63,31 @@ def wrong_parameters(
 
 
 def _passed_before(
-    to_check: Mapping[str, tuple[str, dict[str, Any]]], interfaces: Mapping[str, Interface], workspace: Workspace
+    to_check: Sequence[_ToCheck], interfaces: Mapping[str, Interface], workspace: Workspace
 ) -> Path | None:
     """A file that exists once these parameters were right for this code; None if the code of a node may be anywhere."""
-    if not all(interfaces[name].path.is_relative_to(workspace.folders[-1]) for name in to_check):
+    if not all(interfaces[name].path.is_relative_to(workspace.folders[-1]) for name, _, _ in to_check):
         return None
-    code = code_digest(*(module for module, _ in to_check.values()))
+    code = code_digest(*(module for _, module, _ in to_check))
     key = json.dumps([to_check, code, workspace.digest, sys.version, version("pydantic")])
     return user_cache_path("paramove") / "checked" / hashlib.sha256(key.encode()).hexdigest()
 
 
-def _message_of(node: str, parameter: str, finding: dict[str, Any]) -> str:
-    if finding["type"] in ("extra_forbidden", "unexpected_keyword_argument"):  # the second of dataclasses
-        return f"'{node}' has no parameter '{parameter}'; {nearest(finding['path'][-1], finding['known'])}"
-    if finding["type"] == "missing":
-        return f"'{node}' needs the parameter '{parameter}'"
-    return f"'{node}' rejects {parameter or 'its parameters'}: {finding['message']}, found {finding['found']}"
-
-
-def _check_in_process(to_check: Sequence[tuple[str, dict[str, Any]]], workspace: Workspace) -> tuple[list[Any], str]:
-    """Answers of a process that imports the modules in turn, and how it ended if an answer is missing."""
+def _check_in_process(to_check: Sequence[_ToCheck], workspace: Workspace) -> list[Any]:
+    """Answers of a process that imports the modules in turn; the last one is how it ended if one is missing."""
     try:
-        answer = run_python("-m", __name__, workspace=workspace, timeout_s=TIMEOUT_S, stdin=json.dumps(to_check))
+        process = run_python("-m", __name__, workspace=workspace, timeout_s=TIMEOUT_S, stdin=json.dumps(to_check))
+        output, errors = process.stdout, process.stderr.strip().splitlines()
+        ending = errors[-1] if errors else f"the process ended with exit code {process.returncode}"
     except subprocess.TimeoutExpired as error:
         output = error.stdout.decode() if error.stdout else ""
-        return [json.loads(line) for line in output.splitlines()], f"it took more than {TIMEOUT_S:g} s"
-    last = answer.stderr.strip().splitlines()[-1:] or [f"the process ended with exit code {answer.returncode}"]
-    return [json.loads(line) for line in answer.stdout.splitlines()], last[0]
+        ending = f"it took more than {TIMEOUT_S:g} s"
+    answers = [json.loads(line) for line in output.splitlines()]
+    return answers if len(answers) == len(to_check) else [*answers, ending]
 
 
-def _answer(module: str, parameters: dict[str, Any]) -> str | list[dict[str, Any]]:
-    """Findings about the parameters, or why the module cannot be imported."""
+def _answer(node: str, module: str, parameters: dict[str, Any]) -> str | list[tuple[list[str], str]]:
+    """Position and message of each error in the parameters, or why the module cannot be imported."""
     try:
         config = getattr(importlib.import_module(module), "Config", None)
     except (Exception, SystemExit) as error:  # an import may do anything; its error is reported
@@ -105,31 +97,27 @@ def _answer(module: str, parameters: dict[str, Any]) -> str | list[dict[str, Any
     try:
         config.model_validate(parameters)
     except ValidationError as error:
-        return [_finding(config, details) for details in error.errors()]
+        return [_finding(node, config, details) for details in error.errors()]
     return []
 
 
-def _finding(config: type[BaseModel], details: ErrorDetails) -> dict[str, Any]:
+def _finding(node: str, config: type[BaseModel], details: ErrorDetails) -> tuple[list[str], str]:
     path = [str(part) for part in details["loc"]]
-    return {
-        "path": path,
-        "type": details["type"],
-        "message": _message(details),
-        "found": f"{details['input']!r:.200}",
-        "known": keys_at(config, path[:-1]),
-    }
-
-
-def _message(details: ErrorDetails) -> str:
-    message = details["msg"].removeprefix("Value error, ")
-    return message[:1].lower() + message[1:]
+    parameter = ".".join(path)
+    if details["type"] in ("extra_forbidden", "unexpected_keyword_argument"):  # the second of dataclasses
+        return path, f"'{node}' has no parameter '{parameter}'; {nearest(path[-1], keys_at(config, path[:-1]))}"
+    if details["type"] == "missing":
+        return path, f"'{node}' needs the parameter '{parameter}'"
+    reason = details["msg"].removeprefix("Value error, ")
+    reason = f"{reason[:1].lower()}{reason[1:]}, found {details['input']!r:.200}"
+    return path, f"'{node}' rejects {parameter or 'its parameters'}: {reason}"
 
 
 def main() -> None:
-    """Reads modules and parameters from standard input; writes an answer per line as JSON."""
+    """Reads nodes, modules and parameters from standard input; writes an answer per line as JSON."""
     answers, sys.stdout = sys.stdout, sys.stderr  # so that output of a module does not mix with the answers
-    for module, parameters in json.load(sys.stdin):
-        answers.write(json.dumps(_answer(module, parameters)) + "\n")
+    for node, module, parameters in json.load(sys.stdin):
+        answers.write(json.dumps(_answer(node, module, parameters)) + "\n")
         answers.flush()
 
 

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import FrameType
 from typing import Any, Protocol, Self
 
@@ -18,7 +19,6 @@ from paramove.documents import exit_codes
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.supervision import by_hand
 from paramove.supervision.control import Answer, ControlServer
-from paramove.supervision.domain import Domain
 from paramove.supervision.environment import node_environment
 from paramove.supervision.events import EventLog, signal_name
 from paramove.supervision.launch_file import Launch
@@ -77,7 +77,7 @@ class Supervisor:
         launch: What to run.
         workspace: Where nodes are found; its root is their working directory.
         run_folder: Of this run; configurations of the nodes are written there before.
-        domain: Folders of the bus.
+        bus_folder: Of the sockets.
         view: Shows what happens.
         hosts: The other hosts of the run, by name.
     """
@@ -87,7 +87,7 @@ class Supervisor:
         launch: Launch,
         workspace: Workspace,
         run_folder: RunFolder,
-        domain: Domain,
+        bus_folder: Path,
         view: View,
         hosts: Mapping[str, RemoteHost],
     ) -> None:
@@ -101,7 +101,7 @@ class Supervisor:
         self.nodes = {
             name: SupervisedNode(name, node, self._spawn_node, self._changed) for name, node in self._file.nodes.items()
         }
-        self._bus_folder = domain.folder
+        self._bus_folder = bus_folder
         self._stage: int | None = None
         self._ending = False
         self._stop_s = 0.0
