@@ -34,6 +34,7 @@ from typing import Any
 
 from paramove.documents import Document
 from paramove.source_code import code_digest
+from paramove.supervision.control import json_object
 from paramove.supervision.domain import DomainError, held_domain
 from paramove.supervision.environment import LimitError, allow_open_files
 from paramove.supervision.launch_file import Launch
@@ -78,12 +79,8 @@ class Lines:
                 self.ended |= not part or len(self._begun) > MAX_LINE
         *lines, self._begun = self._begun.split(b"\n")
         found = []
-        for line in lines:
-            try:
-                content = json.loads(line)
-            except ValueError:
-                content = None
-            if not isinstance(content, dict):
+        for content in map(json_object, lines):
+            if content is None:
                 self.ended = True
                 break
             found.append(content)

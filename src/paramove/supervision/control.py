@@ -88,13 +88,19 @@ class ControlServer:
             return True
 
     def _answer_to(self, line: bytes) -> Answer:
-        try:
-            request = json.loads(line)
-        except ValueError:
-            request = None
-        if not isinstance(request, dict):
+        request = json_object(line)
+        if request is None:
             return {"ok": False, "sentence": "a request is an object in JSON on one line"}
         return self._answer(request)
+
+
+def json_object(line: bytes) -> dict[str, Any] | None:
+    """The object that a line of JSON holds; None if it holds anything else."""
+    try:
+        content = json.loads(line)
+    except ValueError:
+        return None
+    return content if isinstance(content, dict) else None
 
 
 def ask(folder: Path, request: dict[str, Any]) -> Answer:

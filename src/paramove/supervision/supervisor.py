@@ -222,8 +222,8 @@ class Supervisor:
             failed = [node.name for node in self.nodes.values() if node.state is State.GIVEN_UP]
             reason = f"given up: {', '.join(failed)}" if failed else "all nodes have finished"
             return Outcome(exit_codes.FAILURE if failed else exit_codes.OK, reason)
-        if self._stuck():
-            return Outcome(exit_codes.FAILURE, f"never started: {', '.join(self._stuck())}")
+        if stuck := self._stuck():
+            return Outcome(exit_codes.FAILURE, f"never started: {', '.join(stuck)}")
         if time.monotonic() > limit_s:
             return Outcome(exit_codes.TIME_LIMIT, f"not finished within {self._file.time_limit_s:g} s")
         return None
@@ -344,11 +344,9 @@ class Interrupts:
         self._before: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
-        for number in _ENDS:
-            self._before[number] = signal.signal(number, self._handle)
-        for number in _SUSPENDS:
-            self._before[number] = signal.signal(number, self._suspend)
-        self._before[signal.SIGCHLD] = signal.signal(signal.SIGCHLD, self._wake)
+        handlers = dict.fromkeys(_ENDS, self._handle) | dict.fromkeys(_SUSPENDS, self._suspend)
+        for number, handler in {**handlers, signal.SIGCHLD: self._wake}.items():
+            self._before[number] = signal.signal(number, handler)
         return self
 
     def __exit__(self, *_: object) -> None:

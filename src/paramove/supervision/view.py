@@ -112,12 +112,11 @@ class TableView(LineView):
         table.add_column("message", ratio=1, no_wrap=True, overflow="ellipsis")
         for node in nodes:
             gauge = self._gauges.setdefault(node.name, _Gauge())
-            gauge.read(node, now_s)
             style = "dim" if node.state in ENDED else _STYLES.get(node.state, "")
             table.add_row(
                 node.name,
                 Text(node.state.value, style=style),
-                *gauge.cells(),
+                *gauge.cells(node, now_s),
                 str(node.restarts or ""),
                 Text(node.detail),
             )
@@ -125,38 +124,32 @@ class TableView(LineView):
 
 
 class _Gauge:
-    """Rate, loss, CPU and memory of one node."""
+    """Measures one node again and again."""
 
     def __init__(self) -> None:
-        self._pid = 0
         self._process: psutil.Process | None = None
         self._processed = 0
         self._read_s = 0.0
         self._rate_hz = 0.0
-        self._lost = 0
-        self._cpu = self._megabytes = 0.0
 
-    def read(self, node: SupervisedNode, now_s: float) -> None:
-        """Measures again; the rate is from the node's count of handled messages since its last change."""
+    def cells(self, node: SupervisedNode, now_s: float) -> tuple[str, str, str, str]:
+        """Rate, loss, CPU, memory as text; empty for a node that does not run.
+
+        The rate is from the node's count of handled messages since its last change.
+        """
         if node.process is None:
-            self._pid, self._process = 0, None
-            return
-        if node.process.pid != self._pid:
-            self._pid, self._processed, self._read_s, self._rate_hz = node.process.pid, 0, now_s, 0.0
+            self._process = None
+            return ("", "", "", "")
+        try:
+            if self._process is None or self._process.pid != node.process.pid:
+                self._process = psutil.Process(node.process.pid)
+                self._processed, self._read_s, self._rate_hz = 0, now_s, 0.0
+            cpu, memory = self._process.cpu_percent(), self._process.memory_info().rss / 2**20
+        except psutil.Error:  # it has just ended
+            self._process = None
+            return ("", "", "", "")
         if node.status.processed != self._processed:
             self._rate_hz = (node.status.processed - self._processed) / max(now_s - self._read_s, 1e-3)
             self._processed, self._read_s = node.status.processed, now_s
-        self._lost = sum(count.lost for count in node.status.received)
-        try:
-            if self._process is None:
-                self._process = psutil.Process(self._pid)
-            self._cpu = self._process.cpu_percent()
-            self._megabytes = self._process.memory_info().rss / 2**20
-        except psutil.Error:  # it has just ended
-            self._process = None
-
-    def cells(self) -> tuple[str, str, str, str]:
-        """Rate, loss, CPU, memory as text; empty for a node that does not run."""
-        if self._process is None:
-            return ("", "", "", "")
-        return (f"{self._rate_hz:.0f}", str(self._lost), f"{self._cpu:.0f}", f"{self._megabytes:.0f}")
+        lost = sum(count.lost for count in node.status.received)
+        return (f"{self._rate_hz:.0f}", str(lost), f"{cpu:.0f}", f"{memory:.0f}")
