@@ -176,12 +176,12 @@ def _address(name: str, hosts: Mapping[str, HostSettings]) -> str:
     host = hosts[name]
     if host.ssh is not None:
         return _resolved(host.ssh)
-    others = [one.address or _resolved(one.ssh) for one in hosts.values() if one.ssh is not None]
+    other = next((one.address or _resolved(one.ssh) for one in hosts.values() if one.ssh is not None), "127.0.0.1")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect((others[0] if others else "127.0.0.1", 9))
+            probe.connect((other, 9))
         except OSError as error:
-            raise InputError(f"{others[0]} cannot be reached: {error.strerror}; give hosts.{name}.address") from error
+            raise InputError(f"{other} cannot be reached: {error.strerror}; give hosts.{name}.address") from error
         return str(probe.getsockname()[0])
 
 

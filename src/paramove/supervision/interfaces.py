@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import importlib.util
 import json
@@ -49,23 +50,15 @@ def source_of(module: str, workspace: Workspace) -> Path:
     for file in (relative.with_suffix(".py"), relative / "__main__.py"):
         if (candidate := workspace.find(file)).is_file():
             return candidate
-    if module.startswith("paramove."):
-        installed = _installed(module)
-        if installed is not None:
-            return installed
+    with contextlib.suppress(ModuleNotFoundError):
+        spec = importlib.util.find_spec(module) if module.startswith("paramove.") else None
+        if spec is not None and spec.origin:
+            return Path(spec.origin)
     known = [name for name in workspace.names(relative.parent, "*.py") if not name.startswith("_")]
     neighbours = f"; {relative.parent} has: {', '.join(known)}" if known else ""
     raise InterfaceError(
         f"there is no module '{module}' ({relative.with_suffix('.py')}) in {workspace.root}{neighbours}"
     )
-
-
-def _installed(module: str) -> Path | None:
-    try:
-        spec = importlib.util.find_spec(module)
-    except ModuleNotFoundError:
-        return None
-    return Path(spec.origin) if spec is not None and spec.origin else None
 
 
 def read_interface(module: str, workspace: Workspace) -> Interface:

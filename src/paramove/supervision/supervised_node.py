@@ -14,6 +14,7 @@ from paramove.supervision.remote_host import RemoteProcess
 from paramove.supervision.stopping import STOP_S
 
 NodeProcess = SupervisedProcess | RemoteProcess
+"""On this host, or on another one."""
 LONGEST_BACKOFF_S = 30.0
 
 
@@ -41,8 +42,6 @@ _STATE_OF_STATUS = {
     NodeStatus.STATE_DEGRADED: State.DEGRADED,
     NodeStatus.STATE_FAILED: State.FAILED,
 }
-
-
 _AT_WORK = (State.READY, State.DEGRADED, State.FAILED)
 MEASURE_PERIOD_S = 1.0
 MAX_CHECK_INTERVAL_S = 0.5
