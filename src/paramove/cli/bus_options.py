@@ -11,6 +11,8 @@ import typer
 
 from paramove.bus import Topic, default_folder, topics
 from paramove.cli import completions
+from paramove.cli.output import ended
+from paramove.documents import exit_codes
 
 DomainOption = Annotated[
     str | None,
@@ -20,15 +22,16 @@ DomainOption = Annotated[
         autocompletion=completions.domains,
     ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="print JSON")]
 
 
 def bus_folder(domain: str | None) -> Path:
     """Folder of the domain's sockets; ends the command if there is none, since nothing runs there."""
     folder = default_folder(domain)
     if not folder.is_dir():
-        typer.echo(f"no bus at {folder}: nothing is running in this domain; start it with `paramove launch`", err=True)
-        raise typer.Exit(1)
+        raise ended(
+            f"no bus at {folder}: nothing is running in this domain; start it with `paramove launch`",
+            exit_codes.FAILURE,
+        )
     return folder
 
 
@@ -37,8 +40,7 @@ def topic_named(name: str) -> Topic:
     try:
         return topics.by_name(name)
     except (KeyError, ValueError) as error:
-        typer.echo(str(error.args[0]), err=True)
-        raise typer.Exit(2) from None
+        raise ended(str(error.args[0]), exit_codes.USAGE) from None
 
 
 OLD_KEYS = {"publisher": "said by", "published": "said so far", "received": "heard"}

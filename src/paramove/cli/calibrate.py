@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from paramove.cli.output import one_line
 from paramove.cli.set_up_view import Prompts, ViewOption, begun, prompts
-from paramove.documents import Image, InputError, exit_codes, printable
+from paramove.documents import InputError, printable
 
 if TYPE_CHECKING:
     from paramove.cameras import Board, BoardView, ImageSource, Lens, Placement
@@ -40,14 +41,9 @@ def board(
     """
     from paramove.cameras import PAPERS, board_sheet
 
-    try:
+    with one_line():
         side = None if square is None else length(square, "--square")
-        sheet = board_sheet(paper, side)
-        out.write_bytes(sheet)
-    except InputError as error:
-        raise _ended(str(error), error.exit_code) from error
-    except OSError as error:
-        raise _ended(f"{error.filename or out}: {error.strerror}", exit_codes.PERMISSION) from error
+        out.write_bytes(board_sheet(paper, side))
     square_mm = PAPERS[paper].square_mm if side is None else 1000.0 * side
     typer.echo(f"{out}: squares of {square_mm:g} mm on {paper}")
     typer.echo("print it at 100 % (not fitted to the page), check its line of 100 mm, glue it to a flat plate")
@@ -67,12 +63,8 @@ def markers(
     from paramove.observation import DEFAULT_MARKERS, ArucoMarker
 
     numbers = {name: marker.number for name, marker in DEFAULT_MARKERS.items() if isinstance(marker, ArucoMarker)}
-    try:
+    with one_line():
         out.write_bytes(marker_sheet(numbers, length(side, "--side"), paper))
-    except InputError as error:
-        raise _ended(str(error), error.exit_code) from error
-    except OSError as error:
-        raise _ended(f"{error.filename or out}: {error.strerror}", exit_codes.PERMISSION) from error
     typer.echo(f"{out}: markers of {side} for {', '.join(numbers)}, two of each")
 
 
@@ -104,16 +96,14 @@ def cameras(
 
     Exit codes: 0 written; 66 no such source; 77 not allowed to write; 78 images that do not calibrate, with the cause.
     """
-    from paramove.cameras import write_cameras
+    from paramove.cameras import Board, write_cameras
 
-    try:
+    with one_line():
         with prompts("Calibrate cameras", view) as to_person:
-            placed = _calibrated(sources, _board(square, thickness), pixels(size), to_person)
-        write_cameras(out, [placement.camera for placement in placed], length(square, "--square"))
-    except InputError as error:
-        raise _ended(str(error), error.exit_code) from error
-    except OSError as error:
-        raise _ended(f"{error.filename or out}: {error.strerror}", exit_codes.PERMISSION) from error
+            side = length(square, "--square")
+            board = Board(side, thickness=length(thickness, "--thickness"))
+            placed = _calibrated(sources, board, pixels(size), to_person)
+        write_cameras(out, [placement.camera for placement in placed], side)
     typer.echo(f"{out}: {len(placed)} camera{'s' * (len(placed) > 1)} in the frame 'table'")
 
 
@@ -123,12 +113,6 @@ def length(text: str, option: str) -> float:
     if match is None:
         raise InputError(f"{option} {text!r}: a length with its unit expected, such as 30mm, 3cm or 0.03m")
     return float(match[1]) / PER_M[match[2]]
-
-
-def _board(square: str, thickness: str) -> Board:
-    from paramove.cameras import Board
-
-    return Board(length(square, "--square"), thickness=length(thickness, "--thickness"))
 
 
 def pixels(text: str) -> tuple[int, int]:
@@ -258,12 +242,3 @@ def _live_frames(device: str, size: tuple[int, int]) -> Iterator[tuple[float, Im
         raise InputError(str(error)) from error
     finally:
         frames.close()
-
-
-def _ended(message: str, code: int) -> typer.Exit:
-    typer.echo(printable(message), err=True)
-    return typer.Exit(code)
-
-
-if __name__ == "__main__":
-    app()

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from paramove.cli import demos_import
-from paramove.cli.bus_options import JsonOption
-from paramove.cli.demos_options import (
+from paramove.cli.movement_options import (
     ActionOption,
     LabelSubjectOption,
     ParametersOption,
@@ -19,12 +18,11 @@ from paramove.cli.demos_options import (
     SetArgument,
     SubjectOption,
     ThetaOption,
-    ended,
+    files_below,
     numbers,
-    one_line,
-    table_of,
     words,
 )
+from paramove.cli.output import JsonOption, ended, one_line, table_of
 from paramove.documents import exit_codes, printable
 
 if TYPE_CHECKING:
@@ -34,9 +32,6 @@ app = typer.Typer(
     name="demos", help="List, show, plot, label, import, split and synthesize demonstrations.", no_args_is_help=True
 )
 app.command("import")(demos_import.import_files)
-
-DEPTH = 3
-"""How far below the folder `list` looks."""
 
 
 @app.command("list")
@@ -50,7 +45,7 @@ def list_sets(
     """
     from paramove.demonstrations import FILE_NAME, DemonstrationError
 
-    files = sorted({file for depth in range(DEPTH) for file in folder.glob("*/" * depth + FILE_NAME)})
+    files = files_below(folder, FILE_NAME)
     if not files:
         raise ended(
             f"no demonstration set in {folder} (a folder with recordings and a {FILE_NAME}); "

@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from paramove.cli.demos_options import (
+from paramove.cli.movement_options import (
     LabelActionOption,
     LabelSubjectOption,
     ParametersOption,
     ThetaOption,
-    ended,
     numbers,
-    one_line,
     words,
 )
+from paramove.cli.output import ended, one_line
 from paramove.documents import exit_codes
 
 if TYPE_CHECKING:

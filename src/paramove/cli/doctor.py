@@ -124,7 +124,3 @@ def _row(part: Part, finding: Finding) -> dict[str, Any]:
         "can_be_fixed": finding.fix is not None,
         "facts": dict(finding.facts),
     }
-
-
-if __name__ == "__main__":
-    app()

@@ -12,12 +12,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 from paramove.cli import completions
-from paramove.cli.evaluation_io import (
-    PROGRESS,
-    JsonFileOption,
-    seeds_in,
-    write_numbers,
-)
+from paramove.cli.evaluation_io import PROGRESS, JsonFileOption, seeds_in, write_numbers
+from paramove.cli.output import ended
 from paramove.documents import exit_codes
 from paramove.workspace import Workspace
 
@@ -108,8 +104,7 @@ def homography(
         try:
             rows.append(accuracy_of(load_run(folder)))
         except RunFolderError as error:
-            Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
-            raise typer.Exit(exit_codes.INPUT_MISSING) from error
+            raise ended(str(error), exit_codes.INPUT_MISSING) from error
     console.print(_homography_table(rows))
     write_numbers(json_file, rows, console)
     good = all(row["grid_mm"]["median"] is not None and row["grid_mm"]["median"] <= GOAL_MM for row in rows)
@@ -117,8 +112,7 @@ def homography(
 
 
 def _moved(context: typer.Context) -> None:
-    typer.echo(f"this is now: python -m studies {context.info_name} (from the root of a clone)", err=True)
-    raise typer.Exit(2)
+    raise ended(f"this is now: python -m studies {context.info_name} (from the root of a clone)", exit_codes.USAGE)
 
 
 for _name in STUDIES:
@@ -186,9 +180,5 @@ def _batch(
             console.print(
                 f"interrupted; {len(results)} of {len(requested)} results are stored in {folder}", soft_wrap=True
             )
-            raise typer.Exit(130) from None
+            raise typer.Exit(exit_codes.CTRL_C) from None
     return [results[seed] for seed in requested]
-
-
-if __name__ == "__main__":
-    app()

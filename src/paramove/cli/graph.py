@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from paramove.cli import completions
+from paramove.cli.output import ended, one_line
+from paramove.documents import exit_codes
 
 if TYPE_CHECKING:
     from paramove.supervision import Graph
@@ -61,26 +63,18 @@ def graph(
     try:
         output.write_text(text, encoding="utf-8")
     except OSError as error:
-        typer.echo(f"{output}: {error.strerror}; name another file with --output", err=True)
-        raise typer.Exit(77) from None
+        raise ended(f"{output}: {error.strerror}; name another file with --output", exit_codes.PERMISSION) from None
     typer.echo(f"written to {output}")
 
 
 def _launched(name: str, overlays: list[str] | None) -> Graph:
-    from paramove.documents import DocumentError, exit_codes
-    from paramove.supervision import LaunchFileMissingError, check, graph_of, load
+    from paramove.supervision import check, graph_of, load
     from paramove.workspace import Workspace
 
-    try:
+    with one_line():
         workspace = Workspace.here()
         launch = load(workspace, name, overlays)
         return graph_of(launch, check(launch, workspace))
-    except LaunchFileMissingError as error:
-        typer.echo(str(error), err=True)
-        raise typer.Exit(exit_codes.INPUT_MISSING) from None
-    except DocumentError as error:
-        typer.echo(str(error), err=True)
-        raise typer.Exit(exit_codes.CONFIGURATION) from None
 
 
 def _running(domain: str | None) -> Graph:
@@ -90,10 +84,7 @@ def _running(domain: str | None) -> Graph:
     folder = bus_folder(domain)
     graph = running_graph(folder, folder.name, MEASURED_S)
     if not graph.nodes:
-        typer.echo("no node is on the bus; name a launch file, such as `paramove graph rule_learning`", err=True)
-        raise typer.Exit(1)
+        raise ended(
+            "no node is on the bus; name a launch file, such as `paramove graph rule_learning`", exit_codes.FAILURE
+        )
     return graph
-
-
-if __name__ == "__main__":
-    app()

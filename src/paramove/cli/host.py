@@ -21,11 +21,6 @@ CommandOption = Annotated[str, typer.Option("--command", help="how paramove is s
 TIMEOUT_S = 60.0
 
 
-@app.callback()
-def _group() -> None:
-    """Trust and check the other computers of a run."""
-
-
 @app.command()
 def trust(host: HostArgument, folder: FolderOption = None, command: CommandOption = "paramove") -> None:
     """Exchange public keys with a host over ssh, and pin them on both sides; needed once.

@@ -16,7 +16,8 @@ from typing import Annotated
 import typer
 
 from paramove.cli import completions
-from paramove.documents import printable
+from paramove.cli.output import ended
+from paramove.documents import exit_codes, printable
 from paramove.supervision import LEVELS, SUPERVISOR, LogLine, RunLogs
 from paramove.workspace import Workspace
 
@@ -59,10 +60,10 @@ def logs(
     folder = _run_folder(run)
     read = RunLogs(folder, node or ())
     if unknown := set(node or ()) - set(read.names()):
-        typer.echo(
-            f"no log of {', '.join(sorted(unknown))} in {folder}; there are: {', '.join(read.names())}", err=True
+        raise ended(
+            f"no log of {', '.join(sorted(unknown))} in {folder}; there are: {', '.join(read.names())}",
+            exit_codes.USAGE,
         )
-        raise typer.Exit(2)
     shown = _Shown(LEVELS[level], as_json)
     try:
         shown.show(read.read())
@@ -80,8 +81,7 @@ def _run_folder(requested: Path | None) -> Path:
     folder = requested or Workspace.here().root / "runs" / "latest"
     if not (folder / "logs").is_dir():
         hint = "give the folder of a run with --run" if requested is None else "a run's folder holds logs/ and run.yaml"
-        typer.echo(f"{folder} holds no logs; {hint}", err=True)
-        raise typer.Exit(66)
+        raise ended(f"{folder} holds no logs; {hint}", exit_codes.INPUT_MISSING)
     return folder.resolve()
 
 
@@ -117,7 +117,3 @@ class _Shown:
 
     def _in(self, colour: int | None, text: str) -> str:
         return f"\x1b[{colour}m{text}\x1b[0m" if self._coloured and colour is not None else text
-
-
-if __name__ == "__main__":
-    app()

@@ -8,18 +8,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from paramove.cli.bus_options import JsonOption
-from paramove.cli.demos_options import PointOption, SetArgument, SubjectOption, ended, table_of
-from paramove.cli.model_options import ModelArgument, loaded, model_files, one_line
+from paramove.cli.movement_options import (
+    ModelArgument,
+    PointOption,
+    SetArgument,
+    SubjectOption,
+    files_below,
+    loaded,
+    model_files,
+)
+from paramove.cli.output import JsonOption, ended, one_line, table_of
 from paramove.documents import InputError, exit_codes, printable
 
 if TYPE_CHECKING:
     from paramove.phmm import ParametricHMM
 
 app = typer.Typer(name="models", help="List, show, plot and compare movement models.", no_args_is_help=True)
-
-DEPTH = 3
-"""How far below the folder `list` looks."""
 
 
 @app.command("list")
@@ -34,8 +38,7 @@ def list_models(
     from paramove.phmm import INDEX_FILE, ParametricHMM
 
     rows, wrong = [], []
-    files = sorted({file for depth in range(DEPTH) for file in folder.glob("*/" * depth + "*.npz")})
-    for file in (file for file in files if file.name != INDEX_FILE and _is_model(file)):
+    for file in (file for file in files_below(folder, "*.npz") if file.name != INDEX_FILE and _is_model(file)):
         try:
             rows.append(_row(file, ParametricHMM.load(file)))
         except InputError as error:

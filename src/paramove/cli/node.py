@@ -11,7 +11,9 @@ import typer
 
 from paramove.bus import inspection
 from paramove.cli import completions
-from paramove.cli.bus_options import DomainOption, JsonOption, bus_folder, show
+from paramove.cli.bus_options import DomainOption, bus_folder, show
+from paramove.cli.output import JsonOption, ended
+from paramove.documents import exit_codes
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.supervision import NoRunError, ask
 
@@ -19,13 +21,7 @@ app = typer.Typer(name="node", help="Look at the nodes on the bus; stop, start o
 
 NameArgument = Annotated[str, typer.Argument(help="name in the launch file", autocompletion=completions.nodes)]
 WaitOption = Annotated[float, typer.Option("--wait", min=0.0, metavar="SECONDS", help="for it to be done")]
-REJECTED = 1
 LOOK_PERIOD_S = 0.05
-
-
-@app.callback()
-def _group() -> None:
-    """Look at the nodes on the bus; stop, start or restart one."""
 
 
 @app.command("list")
@@ -72,18 +68,16 @@ def _do(action: str, name: str, folder: Path, wait_s: float) -> None:
         before = _supervised(folder, name)
         answer = ask(folder, {"do": action, "node": name})
         if not answer["ok"]:
-            typer.echo(answer["sentence"], err=True)
-            raise typer.Exit(REJECTED)
+            raise ended(answer["sentence"], exit_codes.FAILURE)
         row = _followed(folder, name, action, wait_s, None if action == "stop" else (before or {}).get("pid"))
     except NoRunError as error:
-        typer.echo(str(error), err=True)
-        raise typer.Exit(REJECTED) from None
+        raise ended(str(error), exit_codes.FAILURE) from None
     if row is None:
         typer.echo(f"{name}: {action} is done, and the run has ended with it")
         return
     typer.echo(f"{name} is {row['state']}: {row['sentence']}")
     if row["state"] not in (("stopped",) if action == "stop" else ("ready", "degraded")):
-        raise typer.Exit(REJECTED)
+        raise typer.Exit(exit_codes.FAILURE)
 
 
 def _followed(folder: Path, name: str, action: str, wait_s: float, old_pid: int | None) -> dict[str, Any] | None:

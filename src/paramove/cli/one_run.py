@@ -24,7 +24,6 @@ from paramove.supervision import (
     DomainNameError,
     Environment,
     Launch,
-    LaunchFileMissingError,
     LimitError,
     LineView,
     Outcome,
@@ -94,17 +93,14 @@ def _run(options: RunOptions, check_only: bool, output: QueuedOutput) -> int:
                 return _view(console, output, folder, environment, workspace, options.headless)
 
             outcome, folder = application.run(launch, workspace, view, options.runs)
-    except LaunchFileMissingError as error:
-        errors.print(str(error))
-        return exit_codes.INPUT_MISSING
-    except (DocumentError, DomainNameError) as error:
-        errors.print(str(error))
-        if launch is not None and (left_out := _left_out(launch)):
-            errors.print(f"note: --with replaces the default overlays; to apply them too: --with {left_out}")
-        return exit_codes.CONFIGURATION
     except InputError as error:
         errors.print(str(error))
+        if isinstance(error, DocumentError) and launch is not None and (left_out := _left_out(launch)):
+            errors.print(f"note: --with replaces the default overlays; to apply them too: --with {left_out}")
         return error.exit_code
+    except DomainNameError as error:
+        errors.print(str(error))
+        return exit_codes.CONFIGURATION
     except DomainError as error:
         errors.print(str(error))
         return exit_codes.TEMPORARY

@@ -13,19 +13,17 @@ from rich.console import Console
 from rich.progress import track
 
 from paramove.cli import demos_import
-from paramove.cli.bus_options import JsonOption
-from paramove.cli.demos_options import ended, table_of
-from paramove.cli.model_options import INTERRUPTED, ModelsOption, PlotOption, classifier_of, one_line
+from paramove.cli.movement_options import ModelsOption, PlotOption, classifier_of
+from paramove.cli.output import JsonOption, ended, one_line, table_of
 from paramove.demonstrations import DemonstrationError, Movement
-from paramove.documents import printable
+from paramove.documents import exit_codes, printable
 
 if TYPE_CHECKING:
     from paramove.demonstrations import Take
     from paramove.demonstrations.importing import ImportOptions
+    from paramove.training import Recognition
 
 MAX_GAP_S = 0.1
-if TYPE_CHECKING:
-    from paramove.training import Recognition
 
 app = typer.Typer(add_completion=False)
 
@@ -59,7 +57,6 @@ def recognize(
 
     Exit codes: 0, also for an unknown action; 66 a file is missing; 78 a file or the movement cannot be used.
     """
-    from paramove.cli.recognize import movements_of
     from paramove.training import Examiner
 
     if unit not in (None, "m", "cm", "mm"):
@@ -76,7 +73,7 @@ def recognize(
                 for movement in track(movements, "movements", console=console, transient=True, disable=not many)
             ]
         except KeyboardInterrupt:
-            raise ended("interrupted", INTERRUPTED) from None
+            raise ended("interrupted", exit_codes.CTRL_C) from None
         if plot is not None:
             from paramove.demonstrations import write_plot
             from paramove.training import plot_recognition

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
-from paramove.cli.bus_options import JsonOption
+from paramove.cli.output import JsonOption, ended, one_line
 from paramove.documents import exit_codes, printable
-from paramove.recording import RecordingExistsError, Recovery, RecoveryError, StillWrittenError, recover
+from paramove.recording import RecordingExistsError, Recovery, StillWrittenError, recover
 
 app = typer.Typer(add_completion=False)
 
@@ -33,25 +33,17 @@ def recover_recording(
     Exit codes: 0 recovered, or nothing to recover; 2 the output exists; 66 no such file; 75 it is being written;
     78 nothing in it can be read.
     """
-    try:
-        result = recover(file, output)
-    except StillWrittenError as error:
-        raise _ended(str(error), exit_codes.TEMPORARY) from error
-    except RecordingExistsError as error:
-        raise _ended(f"{error} with --output", exit_codes.USAGE) from error
-    except RecoveryError as error:
-        raise _ended(str(error), error.exit_code) from error
-    except OSError as error:
-        raise _ended(f"{error.filename or file}: {error.strerror}", exit_codes.PERMISSION) from error
+    with one_line():
+        try:
+            result = recover(file, output)
+        except StillWrittenError as error:
+            raise ended(str(error), exit_codes.TEMPORARY) from error
+        except RecordingExistsError as error:
+            raise ended(f"{error} with --output", exit_codes.USAGE) from error
     if as_json:
         typer.echo(json.dumps(_facts(result), indent=2))
     else:
         typer.echo("\n".join(_lines(result)))
-
-
-def _ended(message: str, code: int) -> typer.Exit:
-    typer.echo(printable(message), err=True)
-    return typer.Exit(code)
 
 
 def _facts(result: Recovery) -> dict[str, Any]:
@@ -87,7 +79,3 @@ def _lines(result: Recovery) -> list[str]:
             "0.5 s with it at most, a power failure may cost 2 s",
         ]
     return [printable(line) for line in lines]
-
-
-if __name__ == "__main__":
-    app()

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.demos_options import ThetaOption, numbers
-from paramove.cli.model_options import ModelArgument, PlotOption, loaded, one_line
+from paramove.cli.movement_options import ModelArgument, PlotOption, ThetaOption, loaded, numbers
+from paramove.cli.output import one_line
 from paramove.documents import printable
 
 if TYPE_CHECKING:

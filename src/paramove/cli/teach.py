@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.demos_options import ended, one_line
+from paramove.cli.output import ended, one_line
 from paramove.cli.set_up_view import Prompts, ViewOption, prompts
 from paramove.documents import exit_codes
 
@@ -79,7 +78,7 @@ def webcam(
             with prompts(f"Teach {action}", view) as to_person:
                 _lead(teacher, seen_by(calibrated, source, prompts=to_person), to_person)
         except KeyboardInterrupt:
-            raise ended(f"{folder}: {len(taught.written)} movements", exit_codes.by_signal(signal.SIGINT)) from None
+            raise ended(f"{folder}: {len(taught.written)} movements", exit_codes.CTRL_C) from None
     if not teacher.finished:
         raise ended(f"{len(taught.written)} new movements; --append goes on with the others", exit_codes.FAILURE)
     typer.echo(f"{folder}: {len(taught.written)} new; train a model with `paramove train {folder}`")

@@ -9,7 +9,9 @@ import typer
 
 from paramove.bus import inspection, topics
 from paramove.cli import completions
-from paramove.cli.bus_options import DomainOption, JsonOption, bus_folder, show, topic_named, with_old_keys
+from paramove.cli.bus_options import DomainOption, bus_folder, show, topic_named, with_old_keys
+from paramove.cli.output import JsonOption, ended
+from paramove.documents import exit_codes
 
 app = typer.Typer(name="topic", help="Look at topics, messages and rates on the bus.", no_args_is_help=True)
 
@@ -90,8 +92,7 @@ def echo(
     if messages == 0:
         state = inspection.publisher_of(folder, topic)
         reason = f"{state.holder} published nothing" if state.alive else "no publisher"
-        typer.echo(f"{topic.name}: {reason} within {seconds:g} s", err=True)
-        raise typer.Exit(1)
+        raise ended(f"{topic.name}: {reason} within {seconds:g} s", exit_codes.FAILURE)
 
 
 @app.command()

@@ -12,11 +12,10 @@ import typer
 from rich.console import Console
 from rich.progress import Progress, TaskID
 
-from paramove.cli.bus_options import JsonOption
-from paramove.cli.demos_options import SetArgument, ended, words
 from paramove.cli.evaluation_io import PROGRESS
-from paramove.cli.model_options import INTERRUPTED, one_line
-from paramove.documents import InputError, printable
+from paramove.cli.movement_options import SetArgument, words
+from paramove.cli.output import JsonOption, ended, one_line
+from paramove.documents import InputError, exit_codes, printable
 from paramove.training import DEFAULT_FRAMES, DEFAULT_STATES, Kind
 
 if TYPE_CHECKING:
@@ -129,7 +128,7 @@ def _trained(
                 result.append(with_check(one, make[one.action], leave_out, report))
             return result
     except KeyboardInterrupt:
-        raise ended(f"interrupted: {written}", INTERRUPTED) from None
+        raise ended(f"interrupted: {written}", exit_codes.CTRL_C) from None
     except InputError:
         raise
     except ValueError as error:

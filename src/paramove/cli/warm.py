@@ -143,7 +143,3 @@ def _tracking() -> None:
         path = Path(folder) / "cameras.yaml"
         write_cameras(path, [_camera()])
         TrackingSetup(cameras=path).video_tracker()
-
-
-if __name__ == "__main__":
-    app()

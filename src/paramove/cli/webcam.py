@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.demos_options import ended
+from paramove.cli.output import ended, one_line
 from paramove.cli.set_up_view import Prompts, ViewOption, begun, prompts
-from paramove.documents import exit_codes
+from paramove.documents import InputError, exit_codes
 
 if TYPE_CHECKING:
     from paramove.cameras import CalibratedCamera
@@ -23,11 +24,6 @@ SOURCE = "device:/dev/video0, file:VIDEO, folder:PICTURES@RATE, or recording:FIL
 BOARD_LOOKS = 5
 CHEST_M = 0.08
 """The joints of the shoulders are so much farther away than a board that is held at the chest."""
-
-
-@app.callback()
-def _group() -> None:
-    """Track a person with a webcam."""
 
 
 @app.command()
@@ -44,7 +40,6 @@ def setup(
 
     Exit codes: 0 it is there; 66 it could not be had.
     """
-    from paramove.documents import InputError
     from paramove.observation import HEAVY, fetch_networks, stored_network
 
     try:
@@ -76,10 +71,9 @@ def look(
 
     from paramove.cameras import CalibratedCamera
     from paramove.cli.calibrate import pixels
-    from paramove.documents import InputError
     from paramove.observation import checked_networks
 
-    try:
+    with one_line(), contextlib.suppress(KeyboardInterrupt):
         width, height = pixels(size)
         checked_networks()
         camera = CalibratedCamera("webcam", width, height, np.diag([width, width, 1.0]), np.zeros(0), np.eye(4))
@@ -95,10 +89,6 @@ def look(
                         f"right arm: {abs(aside):.0f} deg to the picture's {'right' if aside > 0 else 'left'}, "
                         f"{abs(up):.0f} deg {'up' if up > 0 else 'down'}, {towards}; uncalibrated: directions only"
                     )
-    except KeyboardInterrupt:
-        return
-    except InputError as error:
-        raise ended(str(error), error.exit_code) from error
 
 
 @app.command()
@@ -128,10 +118,9 @@ def person(
     from paramove.action_space import Person, write_person
     from paramove.cameras import check_square_of, measured_cameras
     from paramove.cli.calibrate import length
-    from paramove.documents import InputError
     from paramove.observation import checked_networks
 
-    try:
+    with one_line():
         if (square, distance, height) == (None, None, None):
             typer.echo("no --square, --distance or --height: a mean adult of 1.70 m is assumed")
         camera = measured_cameras(Path(), cameras)[0]
@@ -149,10 +138,6 @@ def person(
             arm = _measured(camera, source, images, to_person, far, tall)
         sizes = {"upper_arm": arm.upper_arm, "forearm": arm.forearm, "hand": arm.hand}
         write_person(out, Person(shoulder=tuple(arm.shoulder), **sizes))
-    except InputError as error:
-        raise ended(str(error), error.exit_code) from error
-    except OSError as error:
-        raise ended(f"{error.filename or out}: {error.strerror}", exit_codes.PERMISSION) from error
     typer.echo(f"{out}: written; the shoulder is in the frame of the table")
 
 
@@ -196,7 +181,6 @@ def _at_chest(
     import numpy as np
 
     from paramove.cameras import Board, BoardFinder, board_depth
-    from paramove.documents import InputError
 
     if images is None:
         raise InputError("--square needs images of the board: a recording of key points has none")
@@ -223,7 +207,6 @@ def seen_by(
 
     `prompts` shows both, unless the images are given, and what is wrong with the pictures.
     """
-    from paramove.documents import InputError
     from paramove.observation import detected_key_points, images_of, recorded_key_points
 
     if sources[0].startswith("recording:"):

@@ -36,7 +36,9 @@ def by_signal(number: int) -> int:
     return 128 + number
 
 
-INTERRUPTED = frozenset(map(by_signal, (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE)))
+CTRL_C = by_signal(signal.SIGINT)
+"""A person ended the command."""
+INTERRUPTED = frozenset({CTRL_C, *map(by_signal, (signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE))})
 """A person ended the run; it is neither a success nor a failure."""
 
 

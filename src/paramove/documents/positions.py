@@ -51,7 +51,7 @@ class Position:
         return f"{source}:{self.line}:{self.column}" if self.line else source
 
 
-class DocumentError(ValueError):
+class DocumentError(InputError):
     """Faults in a launch file: one finding per line, each with its position.
 
     Attributes:
@@ -61,10 +61,11 @@ class DocumentError(ValueError):
     """
 
     def __init__(self, position: Position, message: str, others: Sequence[DocumentError] = ()) -> None:
+        super().__init__(message)
+        self.args = (position, message)  # what a copy in another process is made from
         self.position = position
         self.message = printable(message)
         self.others = tuple(others)
-        super().__init__(position, message)
 
     def __str__(self) -> str:
         lines = [f"{error.position}: {error.message}" for error in self]

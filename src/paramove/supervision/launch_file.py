@@ -20,6 +20,7 @@ from paramove.documents import (
     KeyPath,
     Position,
     closest,
+    exit_codes,
     nearest,
     raise_any,
     read_mapping,
@@ -38,6 +39,8 @@ SERVO_ARM = "servo_arm"
 
 class LaunchFileMissingError(DocumentError):
     """There is no launch file or overlay of that name."""
+
+    exit_code = exit_codes.INPUT_MISSING
 
 
 @dataclass(frozen=True)
@@ -297,7 +300,7 @@ def _has_chain(workspace: Workspace, robot: str) -> bool:
         folder = workspace.find(folder if len(folder.parts) > 1 else Path("robot_description", folder))
     try:
         return "chain" in read_mapping(read_text(folder / "robot.yaml", "robot description"), robot).data
-    except (InputError, DocumentError):
+    except InputError:
         return False
 
 

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.arm.options import BaudOption, ByIdOption, DataOption, SerialOption, ended, open_arm
-from paramove.cli.bus_options import JsonOption
+from paramove.cli.arm.options import BaudOption, ByIdOption, DataOption, SerialOption, open_arm
+from paramove.cli.output import JsonOption, ended
 from paramove.documents import exit_codes
 
 if TYPE_CHECKING:
     from paramove.robots.dynamixel import BusBench
 
-FINDING = 3
 MIN_COMPLETE = 0.99
 
 
@@ -59,7 +58,7 @@ def bench(
         finding = f"the bus cannot hold {rate} Hz: at most {max(bench.rates_hz, default=0)} Hz of those tried"
         typer.echo(finding, err=True)
     if finding:
-        raise typer.Exit(FINDING)
+        raise typer.Exit(exit_codes.JUDGED_A_FAILURE)
 
 
 def _print(bench: BusBench) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import datetime
-import signal
 from importlib.metadata import version
 
 import typer
 
-from paramove.cli.arm.options import ByIdOption, DataOption, RobotOption, SerialOption, ended, explained, open_arm
+from paramove.cli.arm.options import ByIdOption, DataOption, RobotOption, SerialOption, explained, open_arm
 from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
+from paramove.cli.output import ended
 from paramove.documents import exit_codes
 
 
@@ -39,7 +39,7 @@ def calibrate(
         try:
             calibration = calibrator.run(created, f"paramove {version('paramove')}")
         except (QuitError, KeyboardInterrupt) as error:
-            code = exit_codes.FAILURE if isinstance(error, QuitError) else exit_codes.by_signal(signal.SIGINT)
+            code = exit_codes.FAILURE if isinstance(error, QuitError) else exit_codes.CTRL_C
             raise ended("ended before the calibration was complete: nothing was saved", code) from None
         calibration.save(arm.path)
     typer.echo(f"{arm.path}: {len(calibration.joints)} joints; check it with `paramove arm verify`")

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.arm.options import ended
 from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.bus_options import DomainOption
+from paramove.cli.output import ended
 from paramove.documents import exit_codes
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import typer
 
-from paramove.cli.arm.options import ended
 from paramove.cli.bus_options import DomainOption
+from paramove.cli.output import ended
 from paramove.documents import exit_codes
 
 TIMEOUT_S = 1.0

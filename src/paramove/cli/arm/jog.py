@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from paramove.cli.arm.options import ended
 from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
 from paramove.cli.bus_options import DomainOption, bus_folder
+from paramove.cli.output import ended
 from paramove.documents import exit_codes, printable
 from paramove.supervision import QueuedOutput
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import signal
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.documents import InputError, exit_codes, printable
+from paramove.cli.output import ended, one_line
+from paramove.documents import InputError, exit_codes
 from paramove.robots.dynamixel import BY_ID_VARIABLE, DATA_VARIABLE, SerialAdapter, calibration_path, serial_adapter
 
 if TYPE_CHECKING:
@@ -76,11 +76,8 @@ def open_arm(by_id: Path | None, serial: str, data: Path | None, baud_rate: int 
     with explained():
         try:
             adapter = serial_adapter(serial, by_id)
-        except InputError as error:
-            raise ended(str(error), exit_codes.UNAVAILABLE if error.missing else error.exit_code) from error
-        path = calibration_path(adapter.serial, data)
-        port = ServoPort(str(adapter.link), baud_rate or configured_baud_rate(path) or DEFAULT_BAUD_RATE, LATENCY_S)
-        try:
+            path = calibration_path(adapter.serial, data)
+            port = ServoPort(str(adapter.link), baud_rate or configured_baud_rate(path) or DEFAULT_BAUD_RATE, LATENCY_S)
             port.open()
         except InputError as error:
             raise ended(str(error), _code(error)) from error
@@ -93,25 +90,15 @@ def explained() -> Iterator[None]:
     """Ends the command with a message on errors of a servo, the port or a file, and at Ctrl-C."""
     from paramove.robots.dynamixel import PortLostError, ServoError, ServoTimeoutError
 
-    try:
-        yield
-    except (ServoTimeoutError, PortLostError) as error:
-        raise ended(str(error), exit_codes.UNAVAILABLE) from error
-    except ServoError as error:
-        raise ended(str(error), exit_codes.FAILURE) from error
-    except InputError as error:
-        raise ended(str(error), error.exit_code) from error
-    except OSError as error:
-        words = error.strerror or str(error)
-        raise ended(f"{error.filename}: {words}" if error.filename else words, exit_codes.PERMISSION) from error
-    except KeyboardInterrupt:
-        raise ended("interrupted", exit_codes.by_signal(signal.SIGINT)) from None
-
-
-def ended(message: str, code: int) -> typer.Exit:
-    """The exception that ends a command; prints the message to standard error."""
-    typer.echo(printable(message), err=True)
-    return typer.Exit(code)
+    with one_line():
+        try:
+            yield
+        except (ServoTimeoutError, PortLostError) as error:
+            raise ended(str(error), exit_codes.UNAVAILABLE) from error
+        except ServoError as error:
+            raise ended(str(error), exit_codes.FAILURE) from error
+        except KeyboardInterrupt:
+            raise ended("interrupted", exit_codes.CTRL_C) from None
 
 
 def configured_baud_rate(path: Path) -> int:
@@ -125,10 +112,12 @@ def configured_baud_rate(path: Path) -> int:
 
 
 def _code(error: InputError) -> int:
-    """Of a port that cannot be opened."""
-    found = getattr(error.__cause__, "errno", None)
+    """Of an adapter that is not there, or a port that cannot be opened."""
     if error.missing:
         return exit_codes.UNAVAILABLE
-    if found in (errno.EAGAIN, errno.EBUSY):
-        return exit_codes.TEMPORARY
-    return exit_codes.PERMISSION if found == errno.EACCES else exit_codes.CONFIGURATION
+    codes = {
+        errno.EAGAIN: exit_codes.TEMPORARY,
+        errno.EBUSY: exit_codes.TEMPORARY,
+        errno.EACCES: exit_codes.PERMISSION,
+    }
+    return codes.get(getattr(error.__cause__, "errno", None), exit_codes.CONFIGURATION)

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from paramove.cli.arm.options import BaudOption, ByIdOption, DataOption, SerialOption, ended, open_arm
+from paramove.cli.arm.options import BaudOption, ByIdOption, DataOption, SerialOption, open_arm
+from paramove.cli.output import ended
 from paramove.documents import exit_codes
 
 

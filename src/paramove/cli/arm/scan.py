@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from paramove.cli.arm.options import ByIdOption, DataOption, SerialOption, configured_baud_rate, ended, open_arm
-from paramove.cli.bus_options import JsonOption, show
+from paramove.cli.arm.options import ByIdOption, DataOption, SerialOption, configured_baud_rate, open_arm
+from paramove.cli.bus_options import show
+from paramove.cli.output import JsonOption, ended
 from paramove.documents import exit_codes
 from paramove.robots.dynamixel import serial_adapters
 
 if TYPE_CHECKING:
     from paramove.robots.dynamixel import DetectedServo
-
-FINDING = 3
 
 
 def scan(
@@ -58,7 +57,7 @@ def scan(
     if as_json:
         typer.echo(json.dumps(reports, indent=2))
     if findings:
-        raise typer.Exit(FINDING)
+        raise typer.Exit(exit_codes.JUDGED_A_FAILURE)
     if not count:
         raise ended("no servo answers: check the power of the arm and its cables", exit_codes.UNAVAILABLE)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.arm.options import ByIdOption, DataOption, RobotOption, SerialOption, ended, explained, open_arm
+from paramove.cli.arm.options import ByIdOption, DataOption, RobotOption, SerialOption, explained, open_arm
 from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
+from paramove.cli.output import ended
 from paramove.documents import InputError, exit_codes
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def setup(
                 _set_up(arm.chain, plan, servo, person, done)
             except (QuitError, KeyboardInterrupt) as error:
                 left = " ".join(f"--joint {one.joint}" for one in wanted[wanted.index(servo) :])
-                code = exit_codes.FAILURE if isinstance(error, QuitError) else exit_codes.by_signal(signal.SIGINT)
+                code = exit_codes.FAILURE if isinstance(error, QuitError) else exit_codes.CTRL_C
                 raise ended(f"ended before {servo.joint}; continue with {left}", code) from None
             done.append(servo)
     typer.echo("connect all servos and run `paramove arm scan`, then `paramove arm calibrate`")

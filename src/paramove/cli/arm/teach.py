@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +15,11 @@ from paramove.cli.arm.options import (
     OpenArm,
     RobotOption,
     SerialOption,
-    ended,
     explained,
     open_arm,
 )
 from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
+from paramove.cli.output import ended
 from paramove.documents import exit_codes, printable
 from paramove.supervision import QueuedOutput
 
@@ -80,7 +79,7 @@ def teach(
     except QuitError:
         raise typer.Exit(exit_codes.OK if teacher.taught.written else exit_codes.FAILURE) from None
     except KeyboardInterrupt:
-        raise ended("interrupted", exit_codes.by_signal(signal.SIGINT)) from None
+        raise ended("interrupted", exit_codes.CTRL_C) from None
 
 
 def _of_this_arm(description: RobotDescription, arm: OpenArm) -> RobotDescription:

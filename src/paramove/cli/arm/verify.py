@@ -15,14 +15,13 @@ from paramove.cli.arm.options import (
     DataOption,
     OpenArm,
     SerialOption,
-    ended,
     explained,
     open_arm,
 )
-from paramove.cli.bus_options import JsonOption, show
+from paramove.cli.bus_options import show
+from paramove.cli.output import JsonOption, ended
 from paramove.documents import exit_codes
 
-FINDING = 3
 CHOICE = (
     "--write writes the file's settings to the servos, --adopt takes the servos' into the file; where IDs, models or "
     "joints differ, the file is of another arm: `paramove arm scan` shows who is there"
@@ -73,7 +72,7 @@ def verify(
         typer.echo(f"{arm.path}: {len(rows) or 'no'} difference{'s' * (len(rows) != 1)}")
     if rows:
         typer.echo(CHOICE, err=True)
-        raise typer.Exit(FINDING)
+        raise typer.Exit(exit_codes.JUDGED_A_FAILURE)
 
 
 def _check_baud_rate(arm: OpenArm) -> None:

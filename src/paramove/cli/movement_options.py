@@ -1,22 +1,32 @@
-"""Options, errors and files that the commands about movement models share."""
+"""Arguments and options that the commands about demonstrations and movement models share, and the models they name."""
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.demos_options import ended
-from paramove.documents import InputError, exit_codes
-from paramove.recording import RecordingExistsError
+from paramove.documents import InputError
 
 if TYPE_CHECKING:
     from paramove.phmm import MovementClassifier, ParametricHMM
 
-INTERRUPTED = 130
+SetArgument = Annotated[Path, typer.Argument(metavar="SET", help="folder of a demonstration set")]
+ActionOption = Annotated[str | None, typer.Option(help="only this action")]
+SubjectOption = Annotated[str | None, typer.Option(help="only this person")]
+LabelActionOption = Annotated[str | None, typer.Option("--action", help="what is done, such as reaching")]
+ThetaOption = Annotated[
+    str, typer.Option("--theta", metavar="NUMBERS", help="the movement's parameters, such as 0.45,0.1,-0.2")
+]
+ParametersOption = Annotated[
+    str | None,
+    typer.Option("--parameters", metavar="NAMES", help="names of the parameters (default of three: target_x,…)"),
+]
+LabelSubjectOption = Annotated[str, typer.Option("--subject", help="who it is")]
+PointOption = Annotated[str | None, typer.Option("--point", help="body point (default: index, else the last)")]
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="file of a movement model")]
 ModelsOption = Annotated[
     list[Path],
@@ -24,31 +34,40 @@ ModelsOption = Annotated[
 ]
 PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE", help="draw it: .png, .svg, .pdf or .html")]
 
+DEPTH = 3
+"""How far below a folder `list` looks."""
 
-@contextlib.contextmanager
-def one_line() -> Iterator[None]:
-    """Ends the command with what is wrong on standard error, and an exit code, instead of a traceback."""
+
+def numbers(text: str, option: str) -> tuple[float, ...]:
+    """Finite numbers separated by commas; other text is a wrong use of the command."""
     try:
-        yield
-    except InputError as error:
-        raise ended(str(error), error.exit_code) from error
-    except RecordingExistsError as error:
-        raise ended(str(error), exit_codes.USAGE) from error
-    except OSError as error:
-        raise ended(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "), exit_codes.PERMISSION) from error
+        values = tuple(float(part) for part in text.split(",") if part.strip())
+    except ValueError:
+        values = (math.nan,)
+    if not all(map(math.isfinite, values)):
+        raise typer.BadParameter(f"expected numbers such as 0.45,0.1,-0.2, found {text!r}", param_hint=option)
+    return values
+
+
+def words(text: str | None) -> tuple[str, ...] | None:
+    """Names separated by commas; None for none."""
+    return None if text is None else tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def files_below(folder: Path, pattern: str) -> list[Path]:
+    """Files of a name in a folder and below it, `DEPTH` levels in all."""
+    return sorted(file for depth in range(DEPTH) for file in folder.glob("*/" * depth + pattern))
 
 
 def loaded(path: Path) -> ParametricHMM:
     """A model file; of a classifier's folder with one action, that one. Raises InputError as `ParametricHMM.load`."""
     from paramove.phmm import ParametricHMM
 
-    if path.is_dir():
-        files = model_files(path)
-        if len(files) == 1:
-            return ParametricHMM.load(files[0])
-        names = ", ".join(str(file) for file in files) or "none"
+    files = model_files(path) if path.is_dir() else [path]
+    if len(files) != 1:
+        names = ", ".join(map(str, files)) or "none"
         raise InputError(f"{path} is a folder: give one model file; there are: {names}", missing=not files)
-    return ParametricHMM.load(path)
+    return ParametricHMM.load(files[0])
 
 
 def model_files(folder: Path) -> list[Path]:

@@ -1,0 +1,62 @@
+"""What commands print: tables, JSON, and an error as a line with an exit code."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any
+
+import typer
+
+from paramove.documents import InputError, exit_codes, printable
+
+JsonOption = Annotated[bool, typer.Option("--json", help="print JSON")]
+
+
+@contextlib.contextmanager
+def one_line() -> Iterator[None]:
+    """Ends the command with what is wrong on standard error, and an exit code, instead of a traceback."""
+    try:
+        yield
+    except InputError as error:
+        raise ended(str(error), error.exit_code) from error
+    except OSError as error:
+        from paramove.recording import RecordingExistsError  # not before: help pages need none of it
+
+        code = exit_codes.USAGE if isinstance(error, RecordingExistsError) else exit_codes.PERMISSION
+        raise ended(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "), code) from error
+
+
+def ended(text: str, code: int) -> typer.Exit:
+    """The exception that ends a command; prints its lines to standard error."""
+    for line in text.splitlines():
+        typer.echo(printable(line), err=True)
+    return typer.Exit(code)
+
+
+def table_of(rows: Sequence[dict[str, Any]]) -> None:
+    """Prints rows that have the same keys; numbers to the right."""
+    if not rows:
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(show_edge=False, pad_edge=False, box=None)
+    for key, value in rows[0].items():
+        right = isinstance(value, int | float) and not isinstance(value, bool)
+        table.add_column(key, justify="right" if right else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*(_cell(value) for value in row.values()))
+    console = Console(highlight=False, emoji=False, markup=False)
+    wide = 200 if not console.is_terminal else max(console.width, 60)
+    Console(highlight=False, emoji=False, markup=False, width=wide).print(table)
+
+
+def _cell(value: object) -> str:
+    if value is None or value == "":
+        return "–"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list | tuple):
+        return ", ".join(_cell(one) for one in value) or "–"
+    return printable(str(value))
