@@ -76,9 +76,13 @@ def launch(
     141 the program that read the output has ended.
     Ctrl-C once ends the run in order, twice at once. Ctrl-Z does nothing.
     """
-    from paramove.cli.one_run import RunOptions, run  # heavy, and not needed to complete a line or to print help
+    from paramove.cli.one_run import run  # heavy, and not needed to complete a line or to print help
 
-    raise typer.Exit(run(RunOptions(name, overlays, settings or [], seed, headless, runs, page, robot), check))
+    code = run(
+        name, overlays, settings or [],
+        seed=seed, headless=headless, runs=runs, page=page, robot=robot, check_only=check,
+    )  # fmt: skip
+    raise typer.Exit(code)
 
 
 if __name__ == "__main__":

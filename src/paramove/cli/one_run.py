@@ -1,4 +1,4 @@
-"""One run for the terminal: checks, prints notes, runs, and turns every error into a line and an exit code."""
+"""One run for the terminal: checks, makes missing files, runs, and turns every error into a line and an exit code."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import json
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
+import typer
 from rich.console import Console
 
-from paramove.cli.preparing import prepared
-from paramove.cli.set_up_view import open_where_displayed
+from paramove.cli.set_up_view import FOLDER_VARIABLE, open_where_displayed
 from paramove.dashboard import NAME, link_in
-from paramove.documents import DocumentError, InputError, exit_codes
+from paramove.documents import DocumentError, InputError, exit_codes, printable
 from paramove.supervision import (
     DomainError,
     DomainNameError,
@@ -26,6 +26,7 @@ from paramove.supervision import (
     Launch,
     LimitError,
     LineView,
+    MissingFile,
     Outcome,
     QueuedOutput,
     RunFolder,
@@ -44,76 +45,121 @@ PAGE, OWN_PAGE = "view", "page"
 """Overlays with the page for any application, and with what an application changes of it."""
 
 
-@dataclass(frozen=True)
-class RunOptions:
-    """Options of the command line; see `paramove launch --help`."""
+def run(
+    name: str,
+    overlays: Sequence[str] | None,
+    settings: Sequence[str],
+    *,
+    seed: int | None,
+    headless: bool,
+    runs: Path | None,
+    page: bool,
+    robot: str | None,
+    check_only: bool,
+) -> int:
+    """Runs an application, or only checks it; returns the exit code. Never waits for the terminal.
 
-    name: str
-    overlays: Sequence[str] | None
-    settings: Sequence[str]
-    seed: int | None
-    headless: bool
-    runs: Path | None
-    page: bool = False
-    robot: str | None = None
-
-
-def run(options: RunOptions, check_only: bool) -> int:
-    """Runs an application, or only checks it; returns the exit code. Never waits for the terminal."""
+    Args:
+        name: Of the launch file; this and all others as the options of `paramove launch`.
+    """
     with QueuedOutput() as output:
-        return _run(options, check_only, output)
+        console = Console(highlight=False, markup=False, emoji=False)
+        errors = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
+        launch = None
+        try:
+            workspace = Workspace.here()
+            environment = examined(os.environ, workspace.root)
+            for note in environment.notes:
+                errors.print(f"note: {note}")
+            if page:
+                overlays, title = with_page(workspace, name, overlays)
+                settings = [title, *settings]
+            launch = load(workspace, name, overlays, settings, seed, headless, robot)
+            if check_only:
+                application.check(launch, workspace)
+                console.print("\n".join(_found(launch, environment, workspace)), soft_wrap=True)
+                return exit_codes.OK
+            with tempfile.TemporaryDirectory() as set_up:
+                pages = Path(set_up)
+                if code := _prepared(launch, workspace, pages if page else None):
+                    return code
+
+                def view(folder: RunFolder) -> View:
+                    with contextlib.suppress(FileNotFoundError):  # the page of this run follows that of the set-up
+                        shutil.move(pages / NAME, folder.path / NAME)
+                    return _view(console, output, folder, environment, workspace, headless)
+
+                outcome, folder = application.run(launch, workspace, view, runs)
+        except InputError as error:
+            errors.print(str(error))
+            if isinstance(error, DocumentError) and launch is not None and (left_out := _left_out(launch)):
+                errors.print(f"note: --with replaces the default overlays; to apply them too: --with {left_out}")
+            return error.exit_code
+        except DomainNameError as error:
+            errors.print(str(error))
+            return exit_codes.CONFIGURATION
+        except DomainError as error:
+            errors.print(str(error))
+            return exit_codes.TEMPORARY
+        except LimitError as error:
+            errors.print(str(error))
+            return exit_codes.PERMISSION
+        except OSError as error:
+            errors.print(_about_files(error, (runs or workspace.root / "runs").resolve(), environment))
+            return exit_codes.PERMISSION if isinstance(error, PermissionError) else exit_codes.FAILURE
+        if output.dropped:
+            errors.print("note: the terminal blocked for a while, so lines are missing; `paramove logs` shows them")
+        console.print(f"{_verdict(outcome)}{outcome.reason}. Run folder: {folder.path}", soft_wrap=True)
+        return outcome.code
 
 
-def _run(options: RunOptions, check_only: bool, output: QueuedOutput) -> int:
-    console = Console(highlight=False, markup=False, emoji=False)
-    errors = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
-    launch = None
+def _prepared(launch: Launch, workspace: Workspace, pages: Path | None) -> int:
+    """Makes the files that are missing, by commands that lead a person through it; the exit code.
+
+    Each is made when the person presses Enter. Without a terminal it names the first one with its command, and makes
+    none.
+
+    Args:
+        launch: What shall run. workspace: where the files lie, and the commands run.
+        pages: Folder of the page in the browser that follows the commands; None without one.
+
+    Raises DocumentError for a wrong entry, or a command that does not write its file.
+    """
+    for missing in missing_files(launch, workspace):
+        attended, name = sys.stdin.isatty(), missing.path.name
+        typer.echo(printable(f"{name} is missing: {missing.about}"), err=not attended)
+        typer.echo(printable(f"  {missing.typed}"), err=not attended)
+        if not attended or not _agreed():
+            return exit_codes.INPUT_MISSING
+        if code := _made(missing, workspace, pages):
+            typer.echo(f"{name} is still missing; the same command goes on from here", err=True)
+            return code
+        if not missing.path.exists():
+            raise launch.error(("needs",), f"`{missing.typed}` did not write {missing.path}")
+    return exit_codes.OK
+
+
+def _made(missing: MissingFile, workspace: Workspace, pages: Path | None) -> int:
+    """Runs the command that makes the file; its exit code."""
+    shared = {} if pages is None else {FOLDER_VARIABLE: str(pages)}
     try:
-        workspace = Workspace.here()
-        environment = examined(os.environ, workspace.root)
-        for note in environment.notes:
-            errors.print(f"note: {note}")
-        overlays, settings = options.overlays, list(options.settings)
-        if options.page:
-            overlays, title = with_page(workspace, options.name, overlays)
-            settings.insert(0, title)
-        launch = load(workspace, options.name, overlays, settings, options.seed, options.headless, options.robot)
-        if check_only:
-            application.check(launch, workspace)
-            console.print("\n".join(_found(launch, environment, workspace)), soft_wrap=True)
-            return exit_codes.OK
-        with tempfile.TemporaryDirectory() as set_up:
-            pages = Path(set_up)
-            if code := prepared(launch, workspace, pages if options.page else None):
-                return code
+        return subprocess.run(
+            [sys.executable, "-m", "paramove.cli.main", *missing.command],
+            cwd=workspace.root,
+            env={**os.environ, **shared},
+            check=False,
+        ).returncode
+    except KeyboardInterrupt:
+        return exit_codes.CTRL_C
 
-            def view(folder: RunFolder) -> View:
-                with contextlib.suppress(FileNotFoundError):  # the page of this run follows that of the set-up
-                    shutil.move(pages / NAME, folder.path / NAME)
-                return _view(console, output, folder, environment, workspace, options.headless)
 
-            outcome, folder = application.run(launch, workspace, view, options.runs)
-    except InputError as error:
-        errors.print(str(error))
-        if isinstance(error, DocumentError) and launch is not None and (left_out := _left_out(launch)):
-            errors.print(f"note: --with replaces the default overlays; to apply them too: --with {left_out}")
-        return error.exit_code
-    except DomainNameError as error:
-        errors.print(str(error))
-        return exit_codes.CONFIGURATION
-    except DomainError as error:
-        errors.print(str(error))
-        return exit_codes.TEMPORARY
-    except LimitError as error:
-        errors.print(str(error))
-        return exit_codes.PERMISSION
-    except OSError as error:
-        errors.print(_about_files(error, (options.runs or workspace.root / "runs").resolve(), environment))
-        return exit_codes.PERMISSION if isinstance(error, PermissionError) else exit_codes.FAILURE
-    if output.dropped:
-        errors.print("note: the terminal blocked for a while, so lines are missing; `paramove logs` shows them")
-    console.print(f"{_verdict(outcome)}{outcome.reason}. Run folder: {folder.path}", soft_wrap=True)
-    return outcome.code
+def _agreed() -> bool:
+    """Whether a person presses Enter; Ctrl-C and the terminal's end are a no."""
+    typer.echo("press Enter to begin, Ctrl-C to leave it")
+    try:
+        return bool(sys.stdin.readline())
+    except KeyboardInterrupt:
+        return False
 
 
 def _left_out(launch: Launch) -> str:
