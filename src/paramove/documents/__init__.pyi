@@ -15,7 +15,6 @@ from .files import read_text as read_text
 from .files import size_of as size_of
 from .files import unreadable as unreadable
 from .input_error import InputError as InputError
-from .key_findings import findings as findings
 from .old_names import OldNames as OldNames
 from .old_names import renamed_attribute as renamed_attribute
 from .pictures import JPEG as JPEG
@@ -38,5 +37,6 @@ from .reports import report_page as report_page
 from .reports import section as section
 from .reports import table as table
 from .wording import closest as closest
+from .wording import findings as findings
 from .wording import nearest as nearest
 from .wording import printable as printable

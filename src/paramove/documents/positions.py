@@ -112,12 +112,9 @@ class Document:
 
     def overlaid(self, top: Document) -> Document:
         """This document with `top` laid over it: mappings merge, all else is replaced, null removes a key."""
-        merged = Document(dict(self.data), dict(self.positions))
-        for path, position in top.positions.items():
-            if path:  # what is missing at the top level is missing in the launch file
-                merged.positions[path] = position
-        merged.data = _merged(self.data, top.data)
-        return merged
+        # What is missing at the top level is missing in the launch file.
+        positions = {path: position for path, position in top.positions.items() if path}
+        return Document(_merged(self.data, top.data), self.positions | positions)
 
 
 def _merged(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:

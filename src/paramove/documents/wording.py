@@ -1,9 +1,16 @@
-"""Helpers for messages: suggestions of names, and text without control characters."""
+"""Wording of messages: wrong keys of a file, suggestions of names, and text without control characters."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+    from pydantic_core import ErrorDetails
+
+MAX_FINDINGS = 5
 
 
 def closest(word: str, known: Iterable[str]) -> list[str]:
@@ -23,3 +30,21 @@ def nearest(word: str, known: Iterable[str]) -> str:
 def printable(text: str) -> str:
     """The text with control characters, written as escapes."""
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+
+
+def findings(error: ValidationError) -> str:
+    """Each wrong key with its location, the expected and the actual value; at most `MAX_FINDINGS`."""
+    errors = error.errors()
+    more = [f"and {len(errors) - MAX_FINDINGS} more"] if len(errors) > MAX_FINDINGS else []
+    return "; ".join([_described(item) for item in errors[:MAX_FINDINGS]] + more)
+
+
+def _described(item: ErrorDetails) -> str:
+    where = ".".join(map(str, item["loc"])) or "the file"
+    if item["type"] == "missing":
+        return f"{where} is missing"
+    expected = f"{item['msg'][:1].lower()}{item['msg'][1:]}"
+    if item["type"] in ("model_type", "dict_type"):
+        expected = "expected lines of `name: value`"
+    found = "nothing" if item["input"] is None else f"{item['input']!r:.60}"
+    return f"{where}: {expected}, found {found}"

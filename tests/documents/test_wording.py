@@ -3,7 +3,7 @@
 import pytest
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from paramove.documents.key_findings import findings
+from paramove.documents.wording import findings
 
 
 class Part(BaseModel):
