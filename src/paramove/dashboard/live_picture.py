@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict
 
 from paramove.bus import Bus, Received, topics
 from paramove.dashboard.estimates import Estimates
-from paramove.dashboard.robot_shape import RobotShape
+from paramove.dashboard.robot_shape import RobotShape, rounded
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.robots import RobotDescription
@@ -111,7 +111,6 @@ class LivePicture:
         title: Of the page.
         surface: The working surface and the objects on it; None: that of a robot of this kind.
         texts: Words of the application.
-        side: Arm whose shoulder's frame positions are in; with a servo arm it is the base's.
         begun_ns: When the run began, by the bus clock.
         wall_s: Monotonic wall clock, for the age of the nodes' statuses.
     """
@@ -123,12 +122,11 @@ class LivePicture:
         surface: Surface | None = None,
         texts: Texts | None = None,
         *,
-        side: str = "right",
         begun_ns: int = 0,
         wall_s: Callable[[], float] = time.monotonic,
     ) -> None:
         surface = surface or (Surface() if robot is None or robot.chain is None else ARM_SURFACE)
-        self._robot = None if robot is None else _DrawnRobot(robot, surface, side)
+        self._robot = None if robot is None else _DrawnRobot(robot, surface)
         self._estimates = Estimates((surface.x, surface.y))
         self._nodes = NodeTable()
         self._wall_s = wall_s
@@ -199,13 +197,13 @@ class LivePicture:
 class _DrawnRobot:
     """The robot and its surface, as the page draws them; `joints` is the latest message of its joints."""
 
-    def __init__(self, robot: RobotDescription, surface: Surface, side: str) -> None:
-        origin, self._gripper = _sites_of(robot, side)
+    def __init__(self, robot: RobotDescription, surface: Surface) -> None:
+        origin, self._gripper = _sites_of(robot)
         self._shape = RobotShape(robot.model_path, dict(zip(robot.joint_names, robot.base_pose, strict=True)))
         self.joints: Any = None
         self._world = {
             "parts": self._shape.parts(),
-            "shoulder": _rounded(self._shape.site(origin)),
+            "shoulder": rounded(self._shape.site(origin)),
             "surface": {"x": surface.x, "y": surface.y, "z": surface.z},
             "object": {"radius": surface.object_radius, "height": surface.object_height},
         }
@@ -215,15 +213,15 @@ class _DrawnRobot:
         if self.joints is not None:
             self._shape.move({joint.name: joint.position for joint in self.joints.joints})
             self.joints = None
-        moving = {"poses": self._shape.poses(), "gripper": _rounded(self._shape.site(self._gripper))}
+        moving = {"poses": self._shape.poses(), "gripper": rounded(self._shape.site(self._gripper))}
         return {"world": self._world, "robot": moving}
 
 
-def _sites_of(robot: RobotDescription, side: str) -> tuple[str, str]:
-    """Sites of the origin of positions and of the gripper."""
+def _sites_of(robot: RobotDescription) -> tuple[str, str]:
+    """Sites of the origin of positions, the right shoulder or a servo arm's base, and of the gripper."""
     if robot.chain is not None:
         return robot.chain.sites.base, robot.chain.sites.end_effector
-    sites = robot.arm(side).sites
+    sites = robot.arm("right").sites
     return sites.shoulder, sites.gripper
 
 
@@ -262,10 +260,6 @@ def _css(colour: Color) -> str:
     return (
         "rgb(" + " ".join(str(round(255 * min(max(part, 0.0), 1.0))) if part == part else "0" for part in parts) + ")"
     )
-
-
-def _rounded(values: Any) -> list[float]:
-    return [round(float(value), 5) for value in values]
 
 
 def _finite(content: Any) -> Any:

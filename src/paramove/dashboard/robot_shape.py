@@ -29,7 +29,7 @@ class RobotShape:
         base_pose: Joint name -> angle, rad, of the pose until joint angles are received.
     """
 
-    def __init__(self, model_path: Path, base_pose: Mapping[str, float] | None = None) -> None:
+    def __init__(self, model_path: Path, base_pose: Mapping[str, float]) -> None:
         self._model = mujoco.MjModel.from_xml_path(str(model_path))
         self._data = mujoco.MjData(self._model)
         self._geoms = [
@@ -40,7 +40,7 @@ class RobotShape:
         bodies = sorted({int(self._model.geom_bodyid[geom]) for geom in self._geoms})
         self._bodies = np.array(bodies, dtype=np.intp)
         self._index_of_body = {body: index for index, body in enumerate(bodies)}
-        self.move(base_pose or {})
+        self.move(base_pose)
 
     def move(self, angles: Mapping[str, float]) -> None:
         """Takes the joint angles, rad; unknown joints and values that are not finite are ignored."""
@@ -65,10 +65,10 @@ class RobotShape:
                 {
                     "body": self._index_of_body[int(model.geom_bodyid[geom])],
                     "type": _TYPES[int(model.geom_type[geom])],
-                    "size": _rounded(model.geom_size[geom]),
-                    "place": _rounded(model.geom_pos[geom]),
-                    "turn": _rounded(model.geom_quat[geom]),
-                    "colour": _rounded(colour[:3]),
+                    "size": rounded(model.geom_size[geom]),
+                    "place": rounded(model.geom_pos[geom]),
+                    "turn": rounded(model.geom_quat[geom]),
+                    "colour": rounded(colour[:3]),
                 }
             )
         return parts
@@ -76,8 +76,9 @@ class RobotShape:
     def poses(self) -> list[list[float]]:
         """Position x, y, z and quaternion w, x, y, z of each body with parts."""
         poses = np.concatenate([self._data.xpos[self._bodies], self._data.xquat[self._bodies]], axis=1)
-        return [_rounded(pose) for pose in poses]
+        return [rounded(pose) for pose in poses]
 
 
-def _rounded(values: Floats) -> list[float]:
+def rounded(values: Floats) -> list[float]:
+    """As the page gets them."""
     return [round(float(value), 5) for value in values]
