@@ -43,22 +43,18 @@ def bench(
         bench = bench_bus(arm.chain, numbers, rounds)
         device = arm.adapter.device
         timer_ms = latency_timer_ms(device)
-    finding = "" if timer_ms is None else slow_timer(device, timer_ms)
+    findings = [] if timer_ms is None else [slow_timer(device, timer_ms)]
     if as_json:
         values = {name: None if value != value else value for name, value in asdict(bench).items()}
         typer.echo(json.dumps(values | {"latency_timer_ms": timer_ms}, indent=2))
     else:
         _print(bench)
-    if finding:
-        typer.echo(finding, err=True)
     if bench.complete < MIN_COMPLETE * bench.rounds:
-        finding = "answers are missing or damaged: `paramove arm scan` shows who answers, and how"
-        typer.echo(finding, err=True)
-    if rate and rate > max(bench.rates_hz, default=0):
-        finding = f"the bus cannot hold {rate} Hz: at most {max(bench.rates_hz, default=0)} Hz of those tried"
-        typer.echo(finding, err=True)
-    if finding:
-        raise typer.Exit(exit_codes.JUDGED_A_FAILURE)
+        findings.append("answers are missing or damaged: `paramove arm scan` shows who answers, and how")
+    if rate > max(bench.rates_hz, default=0):
+        findings.append(f"the bus cannot hold {rate} Hz: at most {max(bench.rates_hz, default=0)} Hz of those tried")
+    if any(findings):
+        raise ended("\n".join(filter(None, findings)), exit_codes.JUDGED_A_FAILURE)
 
 
 def _print(bench: BusBench) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -10,9 +10,6 @@ from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.bus_options import DomainOption
 from paramove.cli.output import ended
 from paramove.documents import exit_codes
-
-if TYPE_CHECKING:
-    from paramove.msgs.safety_state_pb2 import SafetyState
 
 TIMEOUT_S = 5.0
 QUESTION = "Is everybody out of the arm's reach, and the switch of the motors' power in yours?"
@@ -33,11 +30,7 @@ def enable(
         raise ended("not armed: only a person at a terminal arms; over ssh, use `ssh -t`", exit_codes.FAILURE)
     if not yes and not typer.confirm(QUESTION):
         raise ended("not armed", exit_codes.FAILURE)
-    state = _answer(True, domain)
-    if not _is(state, True):
-        if not state.faults:
-            raise ended(f"{_name(state)}, not armed: the arm's driver does not answer", exit_codes.UNAVAILABLE)
-        raise ended(f"{_name(state)}, not armed: {_reasons(state)}", exit_codes.JUDGED_A_FAILURE)
+    _request(True, domain)
     typer.echo("ARMED: the arm may move; `paramove arm disable` or `paramove arm estop` ends that")
 
 
@@ -46,45 +39,34 @@ def disable(domain: DomainOption = None) -> None:
 
     Exit codes: 0 disarmed; 3 it is not, with every reason; 69 no answer; 75 another program arms this arm.
     """
-    state = _answer(False, domain)
-    if not _is(state, False):
-        raise ended(f"{_name(state)}, not disarmed: {_reasons(state)}", exit_codes.JUDGED_A_FAILURE)
+    _request(False, domain)
     typer.echo("DISARMED")
 
 
-def _answer(armed: bool, domain: str | None) -> SafetyState:
+def _request(armed: bool, domain: str | None) -> None:
+    """Arms or disarms; ends the command with the reasons if the safety gate does not."""
     from paramove.bus import BusFolderError, TopicTakenError, default_folder
-    from paramove.operator import request_arming
+    from paramove.msgs.safety_state_pb2 import SafetyState
+    from paramove.operator import obeyed, request_arming
 
     folder = default_folder(domain)
     if not folder.is_dir():
         raise ended(f"nothing is running in {folder}", exit_codes.UNAVAILABLE)
     try:
-        state = request_arming(folder, armed, TIMEOUT_S)
+        answer = request_arming(folder, armed, TIMEOUT_S)
     except TopicTakenError as error:
         remedy = "stop that one first; `paramove arm estop` stops the arm in any case"
         raise ended(f"{error}: only one program may arm an arm; {remedy}", exit_codes.TEMPORARY) from error
     except BusFolderError as error:
         raise ended(str(error), exit_codes.UNAVAILABLE) from error
-    if state is None:
+    if answer is None:
         raise ended(
             f"no data from a safety gate within {TIMEOUT_S:g} s: is the arm's driver running?", exit_codes.UNAVAILABLE
         )
-    return state
-
-
-def _is(state: SafetyState, armed: bool) -> bool:
-    from paramove.operator import obeyed
-
-    return obeyed(state, armed)
-
-
-def _reasons(state: SafetyState) -> str:
-    return "; ".join(fault.detail for fault in state.faults) or "without a reason"
-
-
-def _name(state: SafetyState) -> str:
-    from paramove.msgs.safety_state_pb2 import SafetyState as State
-
-    name: str = State.State.Name(state.state)
-    return name.removeprefix("STATE_").lower()
+    if obeyed(answer, armed):
+        return
+    state = SafetyState.State.Name(answer.state).removeprefix("STATE_").lower()
+    if armed and not answer.faults:
+        raise ended(f"{state}, not armed: the arm's driver does not answer", exit_codes.UNAVAILABLE)
+    reasons = "; ".join(fault.detail for fault in answer.faults) or "without a reason"
+    raise ended(f"{state}, not {'armed' if armed else 'disarmed'}: {reasons}", exit_codes.JUDGED_A_FAILURE)

@@ -9,7 +9,7 @@ import shutil
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,7 +20,7 @@ from paramove.documents import exit_codes, printable
 from paramove.supervision import QueuedOutput
 
 if TYPE_CHECKING:
-    from paramove.bus import Publisher, Subscriber
+    from paramove.bus import BusVisitor, Publisher
 
 PERIOD_S, TIMEOUT_S, STOP_S = 0.02, 3.0, 1.0
 NO_DATA_S = 2.0
@@ -39,14 +39,15 @@ def jog(
 
     Exit codes: 0 ended by q; 1 no bus; 69 no data from an arm; 75 another program publishes trajectories.
     """
-    from paramove.bus import TopicTakenError
+    from paramove.bus import BusVisitor, TopicTakenError
 
     folder = bus_folder(domain)
     try:
         person = TerminalPerson()
         with (
             QueuedOutput() as output,  # after Ctrl-S, keys must still stop the arm
-            _Link(folder, math.radians(step_deg), person.is_at_terminal) as link,
+            BusVisitor(folder, "jog") as bus,
+            contextlib.closing(_Link(bus, folder, math.radians(step_deg), person.is_at_terminal)) as link,
             person.pressing() as pressed,
         ):
             link.wait_for_arm()
@@ -63,34 +64,26 @@ def jog(
 
 
 class _Link:
-    """The bus as jogging needs it, while it is a context; by_person: a person presses the keys, and no program."""
+    """The bus as jogging needs it; by_person: a person presses the keys, and no program."""
 
-    def __init__(self, folder: Path, step: float, by_person: bool) -> None:
-        from paramove.bus import BusVisitor, topics
+    def __init__(self, bus: BusVisitor, folder: Path, step: float, by_person: bool) -> None:
+        from paramove.bus import topics
         from paramove.operator import ArmingKey, Jogging
 
         self.jogging = Jogging(f"jog-{os.getpid()}-{time.monotonic_ns()}", step)
-        self._folder, self._topics, self._by_person = folder, topics, by_person
+        self._bus, self._folder, self._by_person = bus, folder, by_person
         self._arming = ArmingKey()
         self._arming_message, self._displayed, self._printed_message = "", "", ""
         self._received_s = time.monotonic()
         self._arms: Publisher | None = None
-        self._bus = BusVisitor(folder, "jog")
+        self._trajectories = bus.publisher(topics.ARM_TRAJECTORY)
+        received = (topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
+        self._subscribers = [bus.subscriber(topic) for topic in received]
 
-    def __enter__(self) -> _Link:
-        topics = self._topics
-        with contextlib.ExitStack() as unfinished:
-            unfinished.push(self._bus)
-            self._trajectories = self._bus.publisher(topics.ARM_TRAJECTORY)
-            received = (topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
-            self._subscribers: list[Subscriber] = [self._bus.subscriber(topic) for topic in received]
-            unfinished.pop_all()
-        return self
-
-    def __exit__(self, *error: Any) -> None:
+    def close(self) -> None:
+        """Ends the line that is rewritten."""
         if self._displayed and sys.stdout.isatty():
             typer.echo()  # so that the shell's prompt begins a new line
-        self._bus.__exit__(*error)
 
     def wait_for_arm(self) -> None:
         """Ends the command if no driver publishes joint angles, or none subscribes to trajectories."""
@@ -174,12 +167,12 @@ class _Link:
         self._displayed = what
 
     def _arm(self) -> None:
-        from paramove.bus import TopicTakenError, publish_now
+        from paramove.bus import TopicTakenError, publish_now, topics
         from paramove.msgs.safety_state_pb2 import ArmRequest
         from paramove.operator import TERMINAL
 
         try:
-            self._arms = self._arms or self._bus.publisher(self._topics.OPERATOR_ARM)
+            self._arms = self._arms or self._bus.publisher(topics.OPERATOR_ARM)
         except TopicTakenError as error:
             self._arming.reject(f"{error}, and only one program may arm an arm")
             return

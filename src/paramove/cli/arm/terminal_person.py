@@ -80,7 +80,7 @@ class TerminalPerson:
 
     def _keys(self, prompt: str, look: Callable[[], list[str]]) -> None:
         n_displayed = 0
-        with _unbuffered(self._source.fileno()) as descriptor:  # drops what was typed before, and nothing after
+        with self.pressing() as pressed:  # drops what was typed before, and nothing after
             typer.echo(prompt)
             while True:
                 lines = look()
@@ -89,12 +89,8 @@ class TerminalPerson:
                         UP_AND_CLEAR * n_displayed + "".join(f"  {printable(line)}\n" for line in lines), nl=False
                     )
                     n_displayed = len(lines)
-                if select.select([descriptor], [], [], PERIOD_S)[0]:
-                    key = os.read(descriptor, 1).decode(errors="replace")
-                    if key in DONE:
-                        return
-                    if key in QUIT or not key:
-                        raise QuitError
+                if pressed(PERIOD_S) in DONE:
+                    return
 
     def _lines(self, look: Callable[[], list[str]]) -> None:
         look()
@@ -125,11 +121,11 @@ class TerminalPerson:
 
 
 @contextlib.contextmanager
-def _unbuffered(descriptor: int) -> Iterator[int]:
+def _unbuffered(descriptor: int) -> Iterator[None]:
     """The terminal gives each key at once, and does not echo it; restored afterwards."""
     before = termios.tcgetattr(descriptor)
     tty.setcbreak(descriptor)
     try:
-        yield descriptor
+        yield
     finally:
         termios.tcsetattr(descriptor, termios.TCSANOW, before)  # without waiting for output
