@@ -22,7 +22,7 @@ from paramove.cli.movement_options import (
     numbers,
     words,
 )
-from paramove.cli.output import JsonOption, ended, one_line, table_of
+from paramove.cli.output import JsonOption, ended, list_of, one_line, table_of
 from paramove.documents import exit_codes, printable
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def list_sets(
 
     Exit codes: 0; 66 there is none; 78 the labels of one are wrong, which is reported.
     """
-    from paramove.demonstrations import FILE_NAME, DemonstrationError
+    from paramove.demonstrations import FILE_NAME
 
     files = files_below(folder, FILE_NAME)
     if not files:
@@ -52,18 +52,7 @@ def list_sets(
             "make one with `paramove demos import` or `paramove demos synthesize`",
             exit_codes.INPUT_MISSING,
         )
-    rows, wrong = [], []
-    for file in files:
-        try:
-            rows.append(_listed(file))
-        except DemonstrationError as error:
-            wrong.append(str(error))
-    if as_json:
-        typer.echo(json.dumps(rows, indent=2, ensure_ascii=False))
-    else:
-        table_of(rows)
-    if wrong:
-        raise ended("\n".join(wrong), exit_codes.CONFIGURATION)
+    list_of(files, _listed, as_json)
 
 
 def _listed(file: Path) -> dict[str, Any]:

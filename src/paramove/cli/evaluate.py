@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -59,7 +60,7 @@ def rule_learning(
     succeeded; 3 fewer did; 130 interrupted.
     """
     console = Console(highlight=False, emoji=False)
-    results = _batch(console, seeds, jobs, runs, settings or [], overlays or [], robot, again, video, drop_recordings)
+    results = _batch(console, seeds, jobs, runs, settings or [], overlays or (), robot, again, video, drop_recordings)
     from paramove.runs import LEGEND, TABLE_WIDTH, enough, table_of, totals_of
 
     wide = Console(highlight=False, emoji=False, width=max(console.width, TABLE_WIDTH))
@@ -97,14 +98,12 @@ def homography(
     if run_folder is not None:
         folders = [run_folder]
     else:
-        results = _batch(console, str(seeds), jobs, runs, settings or [], [], None, False, False, False)
+        results = _batch(console, str(seeds), jobs, runs, settings or [])
         folders = [Path(result["run_folder"]) for result in results]
-    rows: list[dict[str, Any]] = []
-    for folder in folders:
-        try:
-            rows.append(accuracy_of(load_run(folder)))
-        except RunFolderError as error:
-            raise ended(str(error), exit_codes.INPUT_MISSING) from error
+    try:
+        rows = [accuracy_of(load_run(folder)) for folder in folders]
+    except RunFolderError as error:
+        raise ended(str(error), exit_codes.INPUT_MISSING) from error
     console.print(_homography_table(rows))
     write_numbers(json_file, rows, console)
     good = all(row["grid_mm"]["median"] is not None and row["grid_mm"]["median"] <= GOAL_MM for row in rows)
@@ -137,12 +136,12 @@ def _batch(
     seeds: str,
     jobs: int,
     runs: Path | None,
-    settings: list[str],
-    overlays: list[str],
-    robot: str | None,
-    again: bool,
-    video: bool,
-    drop_recordings: bool,
+    settings: Sequence[str],
+    overlays: Sequence[str] = (),
+    robot: str | None = None,
+    again: bool = False,
+    video: bool = False,
+    drop_recordings: bool = False,
 ) -> list[dict[str, Any]]:
     from paramove.runs import BatchOptions, finished, run_batch
     from paramove.supervision import check, load

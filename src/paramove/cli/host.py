@@ -37,7 +37,7 @@ def trust(host: HostArgument, folder: FolderOption = None, command: CommandOptio
 def check(host: HostArgument, folder: FolderOption = None, command: CommandOption = "paramove") -> None:
     """Check whether a host can take part in a run: ssh, installation, release and keys."""
     there = HostSettings(ssh=host, folder=folder, command=command)
-    found, expected = _asked(there, "release").strip(), _release()
+    found, expected = _asked(there, "release").strip(), release_of(Workspace.here())
     if found != expected:
         raise InputError(f"{host} has {found}; this computer has {expected}. Install the same on both")
     typer.echo(f"ssh       {host} replies\nrelease   {found}")
@@ -64,17 +64,13 @@ def accept(name: Annotated[str, typer.Argument()], public: Annotated[str, typer.
 @app.command()
 def release() -> None:
     """Print what has to be the same on all computers of a run."""
-    typer.echo(_release())
+    typer.echo(release_of(Workspace.here()))
 
 
 @app.command(hidden=True)
 def agent() -> None:
     """Run this computer's nodes of a run; started by the launcher over ssh, with which it exchanges lines of JSON."""
     raise typer.Exit(0 if Agent(Workspace.here()).run() else 1)
-
-
-def _release() -> str:
-    return release_of(Workspace.here())
 
 
 def _asked(host: HostSettings, *words: str) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 import typer
@@ -70,15 +70,12 @@ def build(requested: str | None) -> typer.Typer:
         if name == requested:
             app.add_typer(importlib.import_module(module).app)
         else:
-            app.command(name, help=help_text)(_placeholder(name))
+            app.command(name, help=help_text)(_placeholder)
     return app
 
 
-def _placeholder(name: str) -> Callable[[], None]:
-    def command() -> None:
-        raise RuntimeError(f"{name} is called without its module")
-
-    return command
+def _placeholder() -> None:
+    raise RuntimeError("a command is called without its module")
 
 
 def wanted_command(arguments: Sequence[str], environment: Mapping[str, str]) -> str | None:

@@ -17,7 +17,7 @@ from paramove.cli.movement_options import (
     loaded,
     model_files,
 )
-from paramove.cli.output import JsonOption, ended, one_line, table_of
+from paramove.cli.output import JsonOption, ended, list_of, one_line, table_of
 from paramove.documents import InputError, exit_codes, printable
 
 if TYPE_CHECKING:
@@ -35,22 +35,12 @@ def list_models(
 
     Exit codes: 0; 66 there is none; 78 one is damaged, which is reported.
     """
-    from paramove.phmm import INDEX_FILE, ParametricHMM
+    from paramove.phmm import INDEX_FILE
 
-    rows, wrong = [], []
-    for file in (file for file in files_below(folder, "*.npz") if file.name != INDEX_FILE and _is_model(file)):
-        try:
-            rows.append(_row(file, ParametricHMM.load(file)))
-        except InputError as error:
-            wrong.append(str(error))
-    if not rows and not wrong:
+    files = [file for file in files_below(folder, "*.npz") if file.name != INDEX_FILE and _is_model(file)]
+    if not files:
         raise ended(f"no movement model in {folder}; `paramove train` makes one", exit_codes.INPUT_MISSING)
-    if as_json:
-        typer.echo(json.dumps(rows, indent=2, ensure_ascii=False))
-    else:
-        table_of(rows)
-    if wrong:
-        raise ended("\n".join(wrong), exit_codes.CONFIGURATION)
+    list_of(files, _row, as_json)
 
 
 def _is_model(file: Path) -> bool:
@@ -64,9 +54,11 @@ def _is_model(file: Path) -> bool:
         return True  # damaged: to be reported
 
 
-def _row(file: Path, model: ParametricHMM) -> dict[str, Any]:
+def _row(file: Path) -> dict[str, Any]:
+    from paramove.phmm import ParametricHMM
     from paramove.training import kind_of, parameter_names
 
+    model = ParametricHMM.load(file)
     about = model.description
     return {
         "file": str(file),

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -32,6 +34,22 @@ def ended(text: str, code: int) -> typer.Exit:
     for line in text.splitlines():
         typer.echo(printable(line), err=True)
     return typer.Exit(code)
+
+
+def list_of(files: Iterable[Path], row: Callable[[Path], dict[str, Any]], as_json: bool) -> None:
+    """Prints the row of each file; ends the command with what is wrong with those that cannot be used."""
+    rows, wrong = [], []
+    for file in files:
+        try:
+            rows.append(row(file))
+        except InputError as error:
+            wrong.append(str(error))
+    if as_json:
+        typer.echo(json.dumps(rows, indent=2, ensure_ascii=False))
+    else:
+        table_of(rows)
+    if wrong:
+        raise ended("\n".join(wrong), exit_codes.CONFIGURATION)
 
 
 def table_of(rows: Sequence[dict[str, Any]]) -> None:

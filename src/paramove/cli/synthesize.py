@@ -13,6 +13,7 @@ from paramove.cli.output import one_line
 from paramove.documents import printable
 
 if TYPE_CHECKING:
+    from paramove.documents import Floats
     from paramove.phmm import ParametricHMM
 
 app = typer.Typer(add_completion=False)
@@ -71,19 +72,17 @@ def synthesize(
             sys.stdout.write(as_csv(made))
 
 
-def _check(model: ParametricHMM, theta: object) -> None:
+def _check(model: ParametricHMM, theta: Floats) -> None:
     """Ends the command for a wrong number of components; warns of values outside the training's bounds."""
-    import numpy as np
-
     from paramove.documents import InputError
     from paramove.training import bounds, parameter_names, with_unit
 
-    names, values = parameter_names(model), np.asarray(theta)
+    names = parameter_names(model)
     low, high = bounds(model)
     low_high = [f"{with_unit(name)}: {a:.4g} to {b:.4g}" for name, a, b in zip(names, low, high, strict=True)]
-    if len(values) != len(names):
-        raise InputError(f"theta has {len(names)} components ({'; '.join(low_high)}), found {len(values)} in --theta")
-    outside = [bounds for bounds, value, minimum, maximum in zip(low_high, values, low, high, strict=True)
+    if len(theta) != len(names):
+        raise InputError(f"theta has {len(names)} components ({'; '.join(low_high)}), found {len(theta)} in --theta")
+    outside = [bounds for bounds, value, minimum, maximum in zip(low_high, theta, low, high, strict=True)
                if not minimum <= value <= maximum]  # fmt: skip
     if outside:
         typer.echo(

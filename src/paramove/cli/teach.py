@@ -76,7 +76,7 @@ def webcam(
         teacher = WebcamTeacher(calibrated, places, taught, sizes=sizes, shoulder=shoulder)
         try:
             with prompts(f"Teach {action}", view) as to_person:
-                _lead(teacher, seen_by(calibrated, source, prompts=to_person), to_person)
+                _lead(teacher, seen_by(calibrated, source, to_person), to_person)
         except KeyboardInterrupt:
             raise ended(f"{folder}: {len(taught.written)} movements", exit_codes.CTRL_C) from None
     if not teacher.finished:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Annotated, Any
 
 import typer
@@ -128,27 +129,20 @@ def hz(
 
 def readable(message: Any) -> dict[str, Any]:
     """A message as JSON values; long byte fields only by their length."""
-    values: dict[str, Any] = {}
-    for field, value in message.ListFields():
-        repeated = not isinstance(value, str | bytes) and hasattr(value, "__len__") and not field.message_type
-        if field.message_type and hasattr(value, "ListFields"):
-            values[field.name] = readable(value)
-        elif field.message_type:
-            values[field.name] = [readable(item) for item in value]
-        elif repeated:
-            values[field.name] = [_scalar(field, item) for item in value]
-        else:
-            values[field.name] = _scalar(field, value)
-    return values
+    return {field.name: _json_value(field, value) for field, value in message.ListFields()}
 
 
-def _scalar(field: Any, value: Any) -> Any:
+def _json_value(field: Any, value: Any) -> Any:
+    if hasattr(value, "ListFields"):
+        return readable(value)
     if isinstance(value, bytes):
         return f"<{len(value)} bytes>" if len(value) > LONGEST_BYTES else value.hex()
+    if hasattr(value, "__len__") and not isinstance(value, str):
+        return [_json_value(field, item) for item in value]
     if field.enum_type:
         known = field.enum_type.values_by_number.get(value)
         return known.name if known else value
-    return value if not isinstance(value, float) or value - value == 0 else str(value)
+    return value if not isinstance(value, float) or math.isfinite(value) else str(value)
 
 
 def _state(alive: bool, welcomed: bool) -> str:

@@ -79,7 +79,7 @@ def look(
         camera = CalibratedCamera("webcam", width, height, np.diag([width, width, 1.0]), np.zeros(0), np.eye(4))
         latest_s = -1.0
         with prompts("Try the camera", view) as to_person:
-            for _, captured_ns, points in seen_by([camera], [source], prompts=to_person):
+            for _, captured_ns, points in seen_by([camera], [source], to_person):
                 x, y, z = points.arm_direction
                 if captured_ns * 1e-9 - latest_s >= 1.0 and np.isfinite(z):
                     latest_s = captured_ns * 1e-9
@@ -130,7 +130,7 @@ def person(
         if live:
             checked_networks()
         with prompts("Measure a person", view) as to_person:
-            images = _images(camera, source, to_person) if live else None
+            images = _images([camera], [source], to_person) if live else None
             if square is not None:
                 side = length(square, "--square")
                 check_square_of(cameras, side)
@@ -155,7 +155,7 @@ def _measured(
 
     set_up = PersonSetUp(camera, distance=distance, height=height)
     to_person.prompt(set_up.prompt)
-    for name, _, points in seen_by([camera], [source], images, to_person):
+    for name, _, points in seen_by([camera], [source], to_person, images):
         if name != camera.name:
             continue
         happened = set_up.see(points)
@@ -166,11 +166,14 @@ def _measured(
     raise ended("the images ended before the person was measured", exit_codes.FAILURE)
 
 
-def _images(camera: CalibratedCamera, source: str, to_person: Prompts) -> Iterator[tuple[CalibratedCamera, int, Image]]:
+def _images(
+    cameras: Sequence[CalibratedCamera], sources: Sequence[str], to_person: Prompts
+) -> Iterator[tuple[CalibratedCamera, int, Image]]:
+    """Images of sources as named on the command line; the page shows those of the first camera on their way."""
     from paramove.observation import images_of
 
-    images = begun(images_of([camera], [as_source(source)]))
-    return images if to_person.page is None else to_person.page.passing(images, camera.name)
+    images = begun(images_of(cameras, [as_source(source) for source in sources]))
+    return images if to_person.page is None else to_person.page.passing(images, cameras[0].name)
 
 
 def _at_chest(
@@ -200,24 +203,23 @@ def _at_chest(
 
 
 def seen_by(
-    cameras: Sequence[CalibratedCamera], sources: Sequence[str],
-    images: Iterator[tuple[CalibratedCamera, int, Image]] | None = None, prompts: Prompts | None = None,
+    cameras: Sequence[CalibratedCamera], sources: Sequence[str], to_person: Prompts,
+    images: Iterator[tuple[CalibratedCamera, int, Image]] | None = None,
 ) -> Iterator[tuple[str, int, BodyKeyPoints]]:  # fmt: skip
     """Camera, capture time, ns, and key points of images, or of sources as named on the command line.
 
-    `prompts` shows both, unless the images are given, and what is wrong with the pictures.
+    `to_person` shows both, unless the images are given, and what is wrong with the pictures.
     """
-    from paramove.observation import detected_key_points, images_of, recorded_key_points
+    from paramove.observation import detected_key_points, recorded_key_points
 
     if sources[0].startswith("recording:"):
         return recorded_key_points(Path(sources[0].removeprefix("recording:")))
     if len(sources) != len(cameras):
         raise InputError(f"{len(cameras)} cameras are calibrated, {len(sources)} sources given: one --source for each")
-    prompts = prompts or Prompts()
-    page = prompts.page
-    if images is None:
-        images = begun(images_of(cameras, [as_source(source) for source in sources]))
-        images = images if page is None else page.passing(images, cameras[0].name)
     offline = not any(as_source(source).startswith("device:") for source in sources)
-    found = detected_key_points(images, lambda trouble: prompts.report(trouble or "all is well again"), offline=offline)
-    return found if page is None else page.drawing(found, cameras[0].name)
+    found = detected_key_points(
+        _images(cameras, sources, to_person) if images is None else images,
+        lambda trouble: to_person.report(trouble or "all is well again"),
+        offline=offline,
+    )
+    return found if to_person.page is None else to_person.page.drawing(found, cameras[0].name)
