@@ -1,7 +1,8 @@
 """Completions after <Tab>: names of launch files, overlays, parameters, topics, nodes and runs.
 
 Called at every <Tab>, so it imports nothing heavy, and where nothing can be offered it offers nothing: an error here
-would appear in the middle of a line that is being typed.
+would appear in the middle of a line that is being typed. Typer leaves out what
+does not begin as the word that is typed.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -20,23 +21,22 @@ from paramove.workspace import Workspace
 _WITH_VALUE = ("--set", "--seed", "--runs", "--robot")
 
 
-def launch_files(incomplete: str) -> list[str]:
+def launch_files() -> list[str]:
     """Launch files of the workspace."""
-    return _beginning(incomplete, Workspace.here().names("launch"))
+    return Workspace.here().names("launch")
 
 
-def overlays(incomplete: str) -> list[str]:
+def overlays() -> list[str]:
     """Overlays of the workspace: those for every launch file, and those for the one that was typed."""
     from paramove.supervision import overlay_folders
 
     workspace = Workspace.here()
-    found = {name for folder in overlay_folders(_typed_launch()[0]) for name in workspace.names(folder)}
-    return _beginning(incomplete, sorted(found))
+    return sorted({name for folder in overlay_folders(_typed_launch()[0]) for name in workspace.names(folder)})
 
 
-def robots(incomplete: str) -> list[str]:
+def robots() -> list[str]:
     """Names of the robots that are described."""
-    return _beginning(incomplete, Workspace.here().robots())
+    return Workspace.here().robots()
 
 
 RobotOption = Annotated[
@@ -49,14 +49,14 @@ RobotOption = Annotated[
 ]
 
 
-def schemas(incomplete: str) -> list[str]:
+def schemas() -> list[str]:
     """Kinds of files that have a schema."""
-    return _beginning(incomplete, ("launch", "overlay"))
+    return ["launch", "overlay"]
 
 
-def parameters(incomplete: str) -> list[str]:
+def parameters() -> list[str]:
     """`node.parameter=` of the launch file that was typed, with its overlays."""
-    return _beginning(incomplete, sorted(_parameters(Workspace.here(), *_typed_launch())))
+    return sorted(_parameters(Workspace.here(), *_typed_launch()))
 
 
 def _typed_launch() -> tuple[str, list[str]]:
@@ -76,50 +76,41 @@ def typed_words(environment: Mapping[str, str]) -> list[str]:
     return (environment.get("COMP_WORDS") or environment.get("_TYPER_COMPLETE_ARGS", "")).split()
 
 
-def nodes(incomplete: str) -> list[str]:
+def nodes() -> list[str]:
     """Nodes that are, or were, on the bus."""
-    return _beginning(incomplete, (path.name.removeprefix("status.") for path in _sockets("status.*")))
+    from paramove.bus import default_folder
+
+    with contextlib.suppress(OSError):
+        sockets = [path for path in default_folder().glob("status.*") if path.suffix != ".lock"]
+        return sorted(path.name.removeprefix("status.") for path in sockets)
+    return []
 
 
-def topics(incomplete: str) -> list[str]:
+def topics() -> list[str]:
     """Topics of the table, and the status topics of the nodes on the bus."""
     from paramove.bus import TOPICS
 
-    statuses = (f"status/{node}" for node in nodes(""))
-    return _beginning(incomplete, [*(topic.name for topic in TOPICS if not topic.truth), *statuses])
+    return [*(topic.name for topic in TOPICS if not topic.truth), *(f"status/{node}" for node in nodes())]
 
 
-def domains(incomplete: str) -> list[str]:
+def domains() -> list[str]:
     """Domains that are, or were, in use."""
     from paramove.bus import default_folder
 
     with contextlib.suppress(OSError):
         found = [path.name for path in default_folder().parent.iterdir() if path.is_dir()]
-        return _beginning(incomplete, (name for name in found if not name.startswith("truth-")))
+        return [name for name in found if not name.startswith("truth-")]
     return []
 
 
-def run_folders(incomplete: str) -> list[str]:
+def run_folders() -> list[str]:
     """Folders of runs, the latest first."""
     with contextlib.suppress(OSError):
-        found = sorted((path.name for path in Path("runs").iterdir() if path.is_dir()), reverse=True)
-        return _beginning(incomplete, (f"runs/{name}" for name in found))
+        return sorted((str(path) for path in Path("runs").iterdir() if path.is_dir()), reverse=True)
     return []
 
 
-def _beginning(incomplete: str, words: Iterable[str]) -> list[str]:
-    return [word for word in words if word.startswith(incomplete)]
-
-
-def _sockets(pattern: str) -> list[Path]:
-    from paramove.bus import default_folder
-
-    with contextlib.suppress(OSError):
-        return sorted(path for path in default_folder().glob(pattern) if path.suffix != ".lock")
-    return []
-
-
-def _parameters(workspace: Workspace, name: str, chosen: Sequence[str] | None) -> Iterator[str]:
+def _parameters(workspace: Workspace, name: str, chosen: Sequence[str]) -> Iterator[str]:
     for node, module in _modules(workspace, name, chosen).items():
         with contextlib.suppress(OSError, SyntaxError, ValueError):
             path = workspace.find(Path(*module.split(".")).with_suffix(".py"))
@@ -130,7 +121,7 @@ def _parameters(workspace: Workspace, name: str, chosen: Sequence[str] | None) -
                     yield f"{node}.{line.target.id}="
 
 
-def _modules(workspace: Workspace, name: str, chosen: Sequence[str] | None) -> dict[str, str]:
+def _modules(workspace: Workspace, name: str, chosen: Sequence[str]) -> dict[str, str]:
     """Node -> module, of a launch file that may be half written."""
     from paramove.documents import DocumentError, read_mapping
     from paramove.supervision import overlay_folders

@@ -165,7 +165,7 @@ def _batch(
             running.append(seed)
             progress.update(task, description=f"seed {', '.join(map(str, running))}")
 
-        def ended(result: dict[str, Any]) -> None:
+        def judged(result: dict[str, Any]) -> None:
             running.remove(result["seed"])
             results[result["seed"]] = result
             verdict = "[green]success[/]" if result.get("success") else "[red]failed[/]"
@@ -174,7 +174,7 @@ def _batch(
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the runs under way end in order
         try:
-            run_batch(missing, options, begun, ended)
+            run_batch(missing, options, begun, judged)
         except KeyboardInterrupt:
             console.print(
                 f"interrupted; {len(results)} of {len(requested)} results are stored in {folder}", soft_wrap=True

@@ -8,7 +8,7 @@ import json
 import logging
 import os
 import sys
-import threading
+import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
@@ -67,9 +67,8 @@ def logs(
     shown = _Shown(LEVELS[level], as_json)
     try:
         shown.show(read.read())
-        pause = threading.Event()
         while follow and not read.ended:
-            pause.wait(LOOK_PERIOD_S)
+            time.sleep(LOOK_PERIOD_S)
             shown.show(read.read())
     except KeyboardInterrupt:
         return

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -84,7 +83,6 @@ def _followed(folder: Path, name: str, action: str, wait_s: float, old_pid: int 
     """The node's row once the action has come to its end or the timeout is over; None if the run has ended."""
     ends = ("stopped", "given up") if action == "stop" else ("ready", "degraded", "failed", "given up", "restarting")
     end_s = time.monotonic() + wait_s
-    pause = threading.Event()
     while True:
         try:
             row = _supervised(folder, name)
@@ -94,7 +92,7 @@ def _followed(folder: Path, name: str, action: str, wait_s: float, old_pid: int 
             return row
         if row["state"] in ends and (row["pid"] is None or row["pid"] != old_pid):
             return row
-        pause.wait(LOOK_PERIOD_S)
+        time.sleep(LOOK_PERIOD_S)
 
 
 def _supervised(folder: Path, name: str) -> dict[str, Any] | None:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import enum
 import hmac
 import http
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from dataclasses import dataclass, field
 from urllib.parse import parse_qs
 
@@ -71,7 +71,7 @@ WITHOUT_LINK = (
 )
 
 
-@dataclass
+@dataclass(frozen=True)
 class Access:
     """Checks requests.
 
@@ -82,7 +82,7 @@ class Access:
     """
 
     port: int
-    files: frozenset[str]
+    files: Set[str]
     secrets: Secrets
 
     @property

@@ -70,7 +70,6 @@ class PageServer:
         self._followed = followed
         self._files = _read_files()
         self._link_file = LinkFile.stored_or_new(folder, port)
-        self._access = Access(0, frozenset(self._files) - {START}, self._link_file.secrets)
         self._sections: dict[str, tuple[int, str]] = {}
         self._image: tuple[int, bytes] = (0, b"")
         self._version = 0
@@ -94,7 +93,12 @@ class PageServer:
     @property
     def port(self) -> int:
         """Where the page listens."""
-        return self._access.port
+        return self._link_file.port
+
+    @property
+    def _access(self) -> Access:
+        """The rules for the present port and secrets."""
+        return Access(self._link_file.port, self._files.keys() - {START}, self._link_file.secrets)
 
     @property
     def watched(self) -> bool:
@@ -153,8 +157,7 @@ class PageServer:
 
     async def _serve(self) -> None:
         server = await self._listening()
-        self._access.port = server.sockets[0].getsockname()[1]
-        self._link_file = self._link_file.at(self._access.port)
+        self._link_file = self._link_file.at(server.sockets[0].getsockname()[1])
         self._started.set()
         await self._leaving.wait()
         end_s = time.monotonic() + FAREWELL_TIMEOUT_S
@@ -203,7 +206,7 @@ class PageServer:
 
     def _page(self, by_token: bool) -> Response:
         """The page. With the token it has the session and the key, and the token is used up."""
-        secrets = self._access.secrets
+        secrets = self._link_file.secrets
         key = secrets.key.encode() if by_token else b""
         response = self._response(http.HTTPStatus.OK, "text/html", self._files[START].replace(KEY_MARK, key))
         if by_token:
@@ -211,7 +214,6 @@ class PageServer:
             response.headers["Set-Cookie"] = cookie
             self._link_file = self._link_file.with_fresh_token()
             self._link_file.write()
-            self._access.secrets = self._link_file.secrets
         return response
 
     def _response(self, status: http.HTTPStatus, media_type: str, body: bytes) -> Response:

@@ -43,13 +43,13 @@ def decoded(data: bytes) -> NDArray[np.uint8]:
     return np.asarray(image, dtype=np.uint8)
 
 
-def read_picture(path: Path, raising: type[InputError] = InputError) -> NDArray[np.uint8]:
-    """BGR pixels [H, W, 3] of a file. Raises `raising` for a missing or damaged file, and for huge pictures."""
-    data = read_bytes(path, "picture", raising, PICTURE_BYTES)
+def read_picture(path: Path) -> NDArray[np.uint8]:
+    """BGR pixels [H, W, 3] of a file. Raises InputError for a missing or damaged file, and for huge pictures."""
+    data = read_bytes(path, "picture", max_bytes=PICTURE_BYTES)
     try:
         return decoded(data)
     except InputError as error:
-        raise raising(f"{path} ({len(data)} bytes) cannot be read: it {error}; remove the file") from error
+        raise InputError(f"{path} ({len(data)} bytes) cannot be read: it {error}; remove the file") from error
 
 
 def claimed_size(data: bytes) -> tuple[int, int]:

@@ -115,7 +115,7 @@ def _code(error: InputError) -> int:
     """Of an adapter that is not there, or a port that cannot be opened."""
     if error.missing:
         return exit_codes.UNAVAILABLE
-    codes = {
+    codes: dict[int | None, int] = {
         errno.EAGAIN: exit_codes.TEMPORARY,
         errno.EBUSY: exit_codes.TEMPORARY,
         errno.EACCES: exit_codes.PERMISSION,
