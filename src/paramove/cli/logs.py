@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import enum
 import itertools
 import json
@@ -91,8 +92,7 @@ class _Shown:
         self._level = level
         self._as_json = as_json
         self._coloured = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
-        self._palette = itertools.cycle(COLOURS)
-        self._colours: dict[str, int] = {SUPERVISOR: 1}
+        self._colours = collections.defaultdict(itertools.cycle(COLOURS).__next__, {SUPERVISOR: 1})
 
     def show(self, lines: Iterable[LogLine]) -> None:
         text = [self._text(line) for line in lines if line.level >= self._level]
@@ -106,13 +106,8 @@ class _Shown:
             facts = {"monotonic_s": line.monotonic_s, "wall": line.wall, "node": line.node, "level": level}
             return json.dumps(facts | {"text": line.text}, ensure_ascii=False)
         time_of_day = line.wall[11:23] or " " * 12
-        name = self._in(self._colour(line.node), f"{line.node:<16}")
+        name = self._in(self._colours[line.node], f"{line.node:<16}")
         return f"{time_of_day} {name} {self._in(LEVEL_COLOURS.get(line.level), f'{level:<7}')} {printable(line.text)}"
-
-    def _colour(self, node: str) -> int:
-        if node not in self._colours:
-            self._colours[node] = next(self._palette)
-        return self._colours[node]
 
     def _in(self, colour: int | None, text: str) -> str:
         return f"\x1b[{colour}m{text}\x1b[0m" if self._coloured and colour is not None else text
