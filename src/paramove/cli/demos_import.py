@@ -141,12 +141,10 @@ def _write(
     from paramove.demonstrations import FILE_NAME, load_labels, write_set
 
     there: dict[tuple[object, ...], int] = {}
-    if add and (to / FILE_NAME).exists():
+    if add and repetition is None and (to / FILE_NAME).exists():
         for segment in load_labels(to / FILE_NAME).file.segments:
             key: tuple[object, ...] = (segment.action, tuple(segment.theta), segment.subject, segment.side)
             there[key] = max(there.get(key, -1), segment.repetition)
-    if repetition is not None:
-        there.clear()
     takes = []
     for result in results:
         for take in result.takes:
