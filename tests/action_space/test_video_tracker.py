@@ -115,9 +115,9 @@ def test_files_of_the_run_come_before_those_of_the_workspace(folder, tmp_path):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("upper_arm: 28", "upper_arm: Input should be less than 0.6; expected for example"),
-        ("upper_am: 0.28", "upper_am: Extra inputs are not permitted"),
-        ("shoulder: [1, 2]", "shoulder.2: Field required"),
+        ("upper_arm: 28", "upper_arm: input should be less than 0.6, found 28; expected for example"),
+        ("upper_am: 0.28", "upper_am: extra inputs are not permitted, found 0.28"),
+        ("shoulder: [1, 2]", "shoulder.2 is missing"),
         ("shoulder: [", "person.yaml:1:12"),
     ],
 )

@@ -94,7 +94,7 @@ def test_only_the_way_to_the_target_depends_on_the_target(pointing):
 
 def test_targets_are_places_on_the_table(pointing):
     theta = np.array([[0.2, 0.4], [0.9, 0.1]])
-    np.testing.assert_allclose(Vocabulary([pointing]).targets(np.zeros(2, dtype=np.int64), theta), table_place(theta))
+    np.testing.assert_allclose(pointing.target(theta), table_place(theta))
     hand = pointing.poses(theta, 0.5)[:, 6:]
     assert np.linalg.norm(hand - table_place(theta), axis=1).max() < 0.04, "the models' hand goes there"
 

@@ -62,7 +62,7 @@ class KalmanToy:
         return -0.5 * ((poses - seen) ** 2).sum(axis=1) / SENSOR**2 - 9.0 * np.log(SENSOR * np.sqrt(2.0 * np.pi))
 
     def kalman(self, elapsed_s, seen):
-        """Predicts and corrects mean and covariance; the log evidence of the frame."""
+        """Predicts and corrects mean and covariance."""
         moved, noise = self._motion(elapsed_s)
         mean, covariance = moved * self.mean, np.outer(moved, moved) * self.covariance + np.diag(noise)
         innovation = seen - self.offset - self.observation @ mean
@@ -70,8 +70,6 @@ class KalmanToy:
         gain = np.linalg.solve(spread, self.observation @ covariance).T
         self.mean = mean + gain @ innovation
         self.covariance = covariance - gain @ self.observation @ covariance
-        _, log_determinant = np.linalg.slogdet(2.0 * np.pi * spread)
-        return float(-0.5 * innovation @ np.linalg.solve(spread, innovation) - 0.5 * log_determinant)
 
     def _motion(self, elapsed_s):
         kept = np.exp(-elapsed_s / MEMORY_S)

@@ -85,12 +85,12 @@ class Grammar:
         return cls.choice([action], n_places)
 
     @classmethod
-    def choice(cls, actions: list[str], n_places: int = 1, switching: Switching | None = None) -> Grammar:
+    def choice(cls, actions: list[str], n_places: int = 1) -> Grammar:
         """After each execution any of the actions (6.7.2, figure 6.23)."""
         places = tuple("abcdefgh"[:n_places])
         followers = tuple(Follower(number, 1.0, (NEW,) * n_places) for number in range(len(actions)))
         steps = tuple(Step(action, action, places, followers) for action in actions)
-        return cls(steps, tuple(range(len(actions))), switching or Switching())
+        return cls(steps, tuple(range(len(actions))))
 
     def check(self, vocabulary: Vocabulary) -> None:
         """Raises InputError unless the vocabulary has each action, with as many places as the steps name."""

@@ -62,10 +62,10 @@ class _Reading:
     """One document being read; every error is raised as DocumentError with its location."""
 
     def __init__(self, document: Document) -> None:
-        self._document = document
-        for key in document.data:
+        self._data, self._error = document.data, document.error
+        for key in self._data:
             if key not in KEYS:
-                raise document.error((key,), f"unknown key {key!r}; {nearest(key, KEYS)}")
+                raise self._error((key,), f"unknown key {key!r}; {nearest(key, KEYS)}")
 
     def grammar(self) -> Grammar:
         after = self._mapping("after")
@@ -85,25 +85,22 @@ class _Reading:
         return Grammar(tuple(steps), begin, self._switching())
 
     def _begin(self, heads: dict[str, _Call]) -> list[_Call]:
-        begin = self._document.data.get("begin")
+        begin = self._data.get("begin")
         if begin is None:
             raise self._error((), f"begin is missing: it names the step that starts from the base pose, as '{EXAMPLE}'")
-        listed = begin if isinstance(begin, list) else [begin]
-        if not listed:
+        entries = _entries(begin, ("begin",))
+        if not entries:
             raise self._error(("begin",), "begin names at least one step")
-        paths = [("begin", str(index)) if isinstance(begin, list) else ("begin",) for index in range(len(listed))]
-        return [self._known(one, path, heads) for one, path in zip(listed, paths, strict=True)]
+        return [self._known(one, path, heads) for one, path in entries]
 
     def _followers(
         self, key: str, head: _Call, heads: dict[str, _Call], numbers: dict[str, int]
     ) -> tuple[Follower, ...]:
-        entries = self._document.data["after"][key]
-        listed = entries if isinstance(entries, list) else [entries]
-        if not listed:
+        entries = _entries(self._data["after"][key], ("after", key))
+        if not entries:
             raise self._error(("after", key), f"nothing follows {key!r}; the last step of a movement leads to begin")
         followers = []
-        for index, entry in enumerate(listed):
-            where = ("after", key, str(index)) if isinstance(entries, list) else ("after", key)
+        for entry, where in entries:
             text, weight = self._weighted(entry, where)
             call = self._known(text, where, heads)
             binding = tuple(head.places.index(place) if place in head.places else NEW for place in call.places)
@@ -164,11 +161,15 @@ class _Reading:
             raise self._error(("switching",), str(error)) from error
 
     def _mapping(self, key: str, default: dict[str, Any] | None = None) -> dict[str, Any]:
-        value = self._document.data.get(key, default)
+        value = self._data.get(key, default)
         if not isinstance(value, dict) or (default is None and not value):
             message = f"expected {key} as a mapping, found {value!r:.80}" if value else f"{key} is missing"
             raise self._error((key,), f"{message}; it lists what may follow each step, such as 'point(a): withdraw(a)'")
         return value
 
-    def _error(self, path: KeyPath, message: str) -> DocumentError:
-        return self._document.error(path, message)
+
+def _entries(value: Any, path: KeyPath) -> list[tuple[Any, KeyPath]]:
+    """The elements of a list, or the value alone, each with its path."""
+    if not isinstance(value, list):
+        return [(value, path)]
+    return [(entry, (*path, str(index))) for index, entry in enumerate(value)]

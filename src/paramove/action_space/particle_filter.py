@@ -63,13 +63,11 @@ class Measurement:
 
     Attributes:
         best: largest log-likelihood of a particle, nats.
-        evidence: ln p(I_t | I_1 ... I_{t-1}), nats.
         temper: exponent by which the likelihood was flattened; 1 if it was not.
         effective: effective number of particles afterwards.
     """
 
     best: float
-    evidence: float
     temper: float
     effective: float
 
@@ -101,10 +99,9 @@ class ParticleFilter:
         temper = tempering(particles.weights, flattened, n_effective)
         with np.errstate(divide="ignore"):
             joint = np.log(particles.weights) + temper * flattened
-        evidence = log_sum(np.log(np.maximum(particles.weights, 1e-300)) + log_likelihoods)
         weights = np.exp(joint - log_sum(joint))
         self.particles = replace(particles, weights=weights / weights.sum())
-        return Measurement(float(log_likelihoods.max()), evidence, temper, effective_number(self.particles.weights))
+        return Measurement(float(log_likelihoods.max()), temper, effective_number(self.particles.weights))
 
     def explore(self, fraction: float) -> None:
         """Moves about this fraction of the particles anywhere; their weights stay."""

@@ -20,7 +20,7 @@ from paramove.action_space.training import table_action
 from paramove.action_space.video_tracker import VideoTracker
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
 from paramove.cameras import measured_cameras, measured_file
-from paramove.documents import InputError, read_document, replacing
+from paramove.documents import InputError, findings, read_document, replacing
 from paramove.observation import ArmObserver, ArmSizes
 from paramove.phmm import ParametricHMM, PolynomialPHMM
 
@@ -66,8 +66,7 @@ def read_person(path: Path) -> Person:
         remedy = f"`paramove webcam person` writes it; it holds a person's measures, such as {example}"
         return Person.model_validate(read_document(path, "file of a person", remedy=remedy).data)
     except ValidationError as error:
-        errors = "; ".join(f"{'.'.join(map(str, one['loc'])) or 'file'}: {one['msg']}" for one in error.errors())
-        raise InputError(f"{path}: {errors}; expected for example {example}") from error
+        raise InputError(f"{path}: {findings(error)}; expected for example {example}") from error
 
 
 def write_person(path: Path, person: Person, decimals: int = 3) -> None:

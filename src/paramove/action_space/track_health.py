@@ -63,7 +63,6 @@ class TrackHealth:
     Attributes:
         lost_since_s: when the track was lost; None while it is not.
         shortfall: nats below the usual, in the latest frame; of the likelihood flattened as it usually is.
-        n_lost: how often it was lost.
         absence: why no arm can be at the estimated pose, in the latest frame; "" if one can.
     """
 
@@ -71,7 +70,6 @@ class TrackHealth:
         self.options = options if options is not None else HealthOptions()
         self.lost_since_s: float | None = None
         self.shortfall = 0.0
-        self.n_lost = 0
         self.absence = ""
         self._absent_s = 0.0
         self._usual, self._variance, self._temper = 0.0, 0.0, 1.0
@@ -101,7 +99,6 @@ class TrackHealth:
         gone = self._bad_s >= self.options.lost_after_s or self._absent_s >= self.options.absent_after_s
         if not self.lost and gone:
             self.lost_since_s = time_s
-            self.n_lost += 1
         elif self.lost and self._good_s >= self.options.found_after_s:
             self.lost_since_s = None
 

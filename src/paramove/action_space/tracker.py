@@ -158,8 +158,8 @@ class ActionTracker:
     """Follows one arm. The same seed and the same measurements give the same estimates.
 
     Attributes:
-        filter: the particles. health: how often the arm was lost. detector: of targets. progress_jumps: how often the
-            estimated progress jumped.
+        filter: the particles. health: whether the arm is lost. detector: of targets. progress_jumps: how often the
+            estimated progress jumped. estimate: that after the latest frame; None before the first.
     """
 
     def __init__(
@@ -174,14 +174,9 @@ class ActionTracker:
         self.health = TrackHealth(self.options.health)
         self.detector = TargetDetector(self.options.detection)
         self.progress_jumps = ProgressJumps()
-        self._estimate: TrackEstimate | None = None
+        self.estimate: TrackEstimate | None = None
         self._blind_since_s: float | None = None
         self._just_lost = False
-
-    @property
-    def estimate(self) -> TrackEstimate | None:
-        """The estimate after the latest frame; None before the first."""
-        return self._estimate
 
     def update(
         self, time_s: float, measure: Measure, presence: Callable[[Floats], Presence] | None = None
@@ -194,7 +189,7 @@ class ActionTracker:
                 finite: there was no usable view.
             presence: evidence that the images show an arm in a pose (D,) in the world.
         """
-        last = self._estimate
+        last = self.estimate
         if last is not None and not time_s > last.time_s:
             return replace(last, detail=f"ignored a frame {last.time_s - time_s:.3f} s older than the latest")
         elapsed_s = 0.0 if last is None else time_s - last.time_s
@@ -213,9 +208,9 @@ class ActionTracker:
         average = mean_pose(self.filter.particles.poses, self.filter.particles.weights)
         present = None if presence is None or measured is None else presence(self.placement.in_world(average))
         self._judge(time_s, elapsed_s, measured, present)
-        self._estimate = self._estimated(time_s, measured, average)
+        self.estimate = self._estimated(time_s, measured, average)
         self._count_jumps(elapsed_s)
-        return self._estimate
+        return self.estimate
 
     def _renew(self, elapsed_s: float) -> None:
         """Moves particles to where the arm could be, if its pose is not known."""
@@ -226,8 +221,8 @@ class ActionTracker:
         elif self._just_lost:
             self.filter.begin_again(options.lost_anywhere, 1.0 - options.lost_retained)
         elif self.health.lost and self._blind_since_s is None:
-            frames = min(8.0 * elapsed_s, 1.0)
-            self.filter.begin_again(options.lost_anywhere, 1.0 - (1.0 - options.lost_renewed) ** frames)
+            renewed = per_step(options.lost_renewed, min(THESIS_RATE_HZ * elapsed_s, 1.0))
+            self.filter.begin_again(options.lost_anywhere, renewed)
         self._just_lost = False
 
     def _usable(self, log_likelihoods: Floats | None) -> Floats | None:
@@ -283,9 +278,9 @@ class ActionTracker:
         return replace(estimate, target=self._target(estimate, reached))
 
     def _count_jumps(self, elapsed_s: float) -> None:
-        if self._estimate is None or self._estimate.lost or self._estimate.degraded:
+        if self.estimate is None or self.estimate.lost or self.estimate.degraded:
             return
-        particles, name = self.filter.particles, self._estimate.action
+        particles, name = self.filter.particles, self.estimate.action
         number = self.vocabulary.index(name)
         rows = self.filter.propagation.actions[particles.step] == number
         advance = elapsed_s / self.vocabulary.actions[number].duration_s

@@ -88,17 +88,17 @@ def cached_action(
 
 
 def table_action_demonstrations(
-    action: Action, seed: int = 0, *, columns: int = 5, rows: int = 3, repetitions: int = 4
+    action: Action, *, columns: int = 5, rows: int = 3, repetitions: int = 4
 ) -> Demonstrations:
     """The synthetic demonstrator reaches for or points at a grid on the table, labelled with (u, v)."""
     targets, places = table_targets(columns, rows)
-    demonstrated = demonstrations_at(targets, np.random.default_rng(seed), action=action, repetitions=repetitions)
+    demonstrated = demonstrations_at(targets, np.random.default_rng(0), action=action, repetitions=repetitions)
     duration = float(np.mean([len(sequence) - 1 for sequence in demonstrated.sequences]) / SAMPLE_RATE_HZ)
     description = MovementDescription(action, POINT_NAMES, "m", FRAME, ("u", "v"), duration, rate_hz=SAMPLE_RATE_HZ)
     return Demonstrations(demonstrated.sequences, np.repeat(places, repetitions, axis=0), description)
 
 
-def table_action(action: Action = "pointing", seed: int = 0, folder: Path | None = None) -> ActionModel:
+def table_action(action: Action) -> ActionModel:
     """Pointing or reaching on the table, trained with the synthetic demonstrator and stored in the user's cache."""
-    source = f"synthetic demonstrator, seed {seed}, 5 x 3 places, 4 repetitions"
-    return cached_action(action, source, lambda: table_action_demonstrations(action, seed), folder=folder)
+    source = "synthetic demonstrator, seed 0, 5 x 3 places, 4 repetitions"
+    return cached_action(action, source, lambda: table_action_demonstrations(action))

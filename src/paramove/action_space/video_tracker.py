@@ -80,18 +80,16 @@ class VideoTracker:
     Args:
         tracker: The filter.
         observer: Compares postures with images; its cameras are `cameras`.
-        key_points: Compares postures with the key points of the same cameras; by default one with default options.
         cameras: As calibrated, in the order of the observer.
         period_s: Time between two images of a camera, s.
     """
 
     def __init__(
-        self, tracker: ActionTracker, observer: ArmObserver, cameras: Sequence[CalibratedCamera], period_s: float,
-        key_points: KeyPointObserver | None = None,
-    ) -> None:  # fmt: skip
+        self, tracker: ActionTracker, observer: ArmObserver, cameras: Sequence[CalibratedCamera], period_s: float
+    ) -> None:
         self._tracker = tracker
         self._observer = observer
-        self._key_points = KeyPointObserver(observer.sizes, cameras) if key_points is None else key_points
+        self._key_points = KeyPointObserver(observer.sizes, cameras)
         self._cameras = {camera.name: camera for camera in cameras}
         self._awaited = AwaitedKeyPoints(list(self._cameras))
         self._views = AlignedViews[Timed](list(self._cameras), period_s)

@@ -246,12 +246,3 @@ class Vocabulary:
             if len(rows):
                 model.write_poses(rows, theta, tau, deviation, poses)
         return poses
-
-    def targets(self, action: Ints, theta: Floats) -> Floats:
-        """Where the hand goes, (M, 3), m, in the frame of the models."""
-        places = np.empty((len(action), 3))
-        for number, model in enumerate(self.actions):
-            rows = action == number
-            if rows.any():
-                places[rows] = model.target(theta[rows, : model.n_parameters])
-        return places
