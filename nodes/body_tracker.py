@@ -9,7 +9,7 @@ Publishes   human/arm_pose                    ArmPose                     15 Hz 
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.cameras import FrameError, decode
-from paramove.observation import BodyTrackingSetup, arm_pose_message, outline_message, scene_message
+from paramove.observation import BodyTrackingSetup, body_messages
 
 SUBSCRIBES = topics.CAMERA_IMAGES
 PUBLISHES = (topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)
@@ -34,8 +34,7 @@ def run(bus: Bus, config: Config) -> None:
         elif (camera := event.topic.name.removesuffix("/image")) in tracking.cameras:
             try:
                 for pose in tracking.see(camera, event.captured_ns, decode(event.message)):
-                    messages = (arm_pose_message(pose), outline_message(pose, first), scene_message(pose))
-                    for topic, message in zip(PUBLISHES, messages, strict=True):
+                    for topic, message in zip(PUBLISHES, body_messages(pose, first), strict=True):
                         bus.publish(topic, message, pose.captured_ns)
             except FrameError as error:
                 tracking.add_unreadable(camera, event.captured_ns, str(error))

@@ -21,7 +21,7 @@ class Awaited:
 
     def images(self, at, *missing):
         views = tuple(None if number in missing else (at * MS, IMAGE) for number in range(self.count))
-        return self._released(self.awaited.add_set(Views(at * MS, views, ())))
+        return self._released(self.awaited.add_set(Views(at * MS, views)))
 
     def points(self, at, camera="camera_1"):
         return self._released(self.awaited.add_points(camera, at * MS, POINTS))

@@ -14,63 +14,57 @@ def picture(number: int) -> np.ndarray:
     return np.full((2, 2, 3), number, np.uint8)
 
 
-def fed(views: AlignedViews, *heard: tuple[str, int]) -> list[tuple[int, tuple[int | None, ...], tuple[str, ...]]]:
-    """Sets as (time in ms, numbers of their images, silent cameras); an image's number is its time in ms / 10."""
+def fed(views: AlignedViews, *heard: tuple[str, int]) -> list[tuple[int, tuple[int | None, ...]]]:
+    """Sets as (time in ms, numbers of their images); an image's number is its time in ms / 10."""
     sets = []
     for name, at_ms in heard:
         for made in views.add(name, at_ms * 1_000_000, picture(at_ms // 10)):
             numbers = tuple(None if image is None else int(image[0, 0, 0]) for image in made.images)
-            sets.append((made.captured_ns // 1_000_000, numbers, made.silent))
+            sets.append((made.captured_ns // 1_000_000, numbers))
     return sets
 
 
 def test_one_camera_waits_for_nobody() -> None:
-    assert fed(AlignedViews(["a"], 0.1), ("a", 0), ("a", 100)) == [(0, (0,), ()), (100, (10,), ())]
+    assert fed(AlignedViews(["a"], 0.1), ("a", 0), ("a", 100)) == [(0, (0,)), (100, (10,))]
 
 
 def test_a_set_is_complete_when_each_camera_has_an_image() -> None:
     heard = [("a", 0), ("b", 20), ("b", 110), ("a", 100)]
-    assert fed(AlignedViews(["a", "b"], 0.1), *heard) == [(20, (0, 2), ()), (110, (10, 11), ())]
+    assert fed(AlignedViews(["a", "b"], 0.1), *heard) == [(20, (0, 2)), (110, (10, 11))]
 
 
 def test_an_image_that_does_not_come_is_missing_from_its_set_only() -> None:
     heard = [("a", 0), ("b", 0), ("a", 100), ("a", 200), ("b", 200)]
     assert fed(AlignedViews(["a", "b"], 0.1), *heard) == [
-        (0, (0, 0), ()),
-        (100, (10, None), ()),
-        (200, (20, 20), ()),
+        (0, (0, 0)),
+        (100, (10, None)),
+        (200, (20, 20)),
     ]
 
 
-def test_a_silent_camera_is_named_and_not_waited_for_until_it_comes_back() -> None:
+def test_a_silent_camera_is_not_waited_for_until_it_comes_back() -> None:
     heard = [("a", 0), ("b", 0), *(("a", at) for at in range(100, 700, 100)), ("b", 700), ("a", 700)]
     sets = fed(AlignedViews(["a", "b"], 0.1), *heard)
-    assert [images[1] for _, images, _ in sets] == [0, None, None, None, None, None, None, 70]
-    assert [silent for _, _, silent in sets if silent] == [("b",), ("b",), ("b",)]
-    assert sets[-1] == (700, (70, 70), ())
+    assert [images[1] for _, images in sets] == [0, None, None, None, None, None, None, 70]
+    assert sets[-1] == (700, (70, 70))
 
 
 def test_a_camera_that_never_spoke_is_gone_too() -> None:
     sets = fed(AlignedViews(["a", "b"], 0.1), *(("a", at) for at in range(0, 600, 100)))
-    assert sets[-1] == (500, (50, None), ("b",))
+    assert sets[-1] == (500, (50, None))
 
 
 def test_a_late_image_makes_no_set() -> None:
     views = AlignedViews(["a", "b"], 0.1)
     fed(views, ("a", 0), ("b", 0), ("a", 100), ("b", 100))
     assert fed(views, ("a", 20)) == []
-    assert fed(views, ("a", 200), ("b", 200)) == [(200, (20, 20), ())]
+    assert fed(views, ("a", 200), ("b", 200)) == [(200, (20, 20))]
 
 
 @pytest.mark.parametrize("names", [[], ["a", "a"]])
 def test_cameras_without_names_of_their_own_are_refused(names: list[str]) -> None:
     with pytest.raises(ValueError, match="each with a name of its own"):
         AlignedViews(names, 0.1)
-
-
-def test_an_unknown_camera_is_named_with_the_known() -> None:
-    with pytest.raises(ValueError, match="one of left, right expected"):
-        list(AlignedViews(["left", "right"], 0.1).add("middle", 0, picture(0)))
 
 
 def test_a_camera_that_comes_back_after_the_others_is_part_of_the_sets_again():

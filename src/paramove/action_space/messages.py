@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
-from foxglove_schemas_protobuf.PointsAnnotation_pb2 import PointsAnnotation
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
@@ -17,7 +16,16 @@ from paramove.cameras import WORLD_FRAME
 from paramove.documents import Floats
 from paramove.msgs.action_estimate_pb2 import ActionEstimate, ActionParameter, Location
 from paramove.msgs.arm_pose_pb2 import ArmPose
-from paramove.observation import BENT_POSE_POINTS, HAND
+from paramove.observation import (
+    BENT_POSE_POINTS,
+    GREEN,
+    HAND,
+    add_circle,
+    line_in_image,
+    line_in_scene,
+    opaque,
+    pose_message,
+)
 
 if TYPE_CHECKING:
     from paramove.action_space.video_tracker import TrackedState
@@ -126,58 +134,32 @@ def estimate_message(
 
 def arm_pose_message(state: TrackedState) -> ArmPose:
     """The estimated arm; its hand is the tip of the index finger. With the wrist if its action models it."""
-    message = ArmPose(frame=WORLD_FRAME)
-    message.captured.FromNanoseconds(state.captured_ns)
     points = state.estimate.pose.reshape(-1, 3)
-    for name, (x, y, z) in zip(BENT_POSE_POINTS[: len(points)], points, strict=True):
-        message.points.add(name=NAMES_IN_MESSAGES[name], x=x, y=y, z=z)
-    return message
+    names = (NAMES_IN_MESSAGES[name] for name in BENT_POSE_POINTS[: len(points)])
+    return pose_message(state.captured_ns, dict(zip(names, points, strict=True)))
 
 
 def outline_message(state: TrackedState) -> ImageAnnotations:
     """The outline of the estimated arm and the ball where it points, in the first camera's image."""
-    message = ImageAnnotations()
-    message.timestamp.FromNanoseconds(state.captured_ns)
-    points = message.points.add(type=PointsAnnotation.LINE_LOOP, thickness=2.0)
-    points.timestamp.CopyFrom(message.timestamp)
-    colour = (1.0, 0.3, 0.2) if state.estimate.lost else (0.2, 1.0, 0.4)
-    points.outline_color.r, points.outline_color.g, points.outline_color.b = colour
-    points.outline_color.a = 1.0
-    for x, y in state.outline:
-        points.points.add(x=x, y=y)
+    colour = (1.0, 0.3, 0.2) if state.estimate.lost else GREEN
+    message = line_in_image(state.captured_ns, state.outline, colour, closed=True)
     if np.isfinite(state.ball).all():
-        circle = message.circles.add(diameter=9.0, thickness=1.0)
-        circle.timestamp.CopyFrom(message.timestamp)
-        circle.position.x, circle.position.y = state.ball
-        colour = ball_colour(certainty(state.pointed_deviation))
-        for part in (circle.fill_color, circle.outline_color):
-            part.r, part.g, part.b = colour
-            part.a = 1.0
+        add_circle(message, state.ball, 9.0, ball_colour(certainty(state.pointed_deviation)))
     return message
 
 
 def scene_message(state: TrackedState, table: TablePose = AT_TABLE) -> SceneUpdate:
     """The estimated arm as lines and the ball where it points, in the frame of `table`."""
-    message = SceneUpdate()
-    entity = message.entities.add(id="target", frame_id=table.frame)
-    entity.timestamp.FromNanoseconds(state.captured_ns)
-    entity.lifetime.FromMilliseconds(1000)
-    ball = entity.spheres.add()
-    position = ball.pose.position
-    position.x, position.y, position.z = table.frame_from_table(state.pointed)
+    arm = table.frame_from_table(state.estimate.pose[:9].reshape(3, 3))
+    message = line_in_scene(state.captured_ns, "target", arm, table.frame)
+    ball = message.entities[0].spheres.add(color=opaque(ball_colour(certainty(state.pointed_deviation))))
+    ball.pose.position.x, ball.pose.position.y, ball.pose.position.z = table.frame_from_table(state.pointed)
     ball.pose.orientation.w = 1.0
     ball.size.x = ball.size.y = ball.size.z = BALL_M
-    ball.color.r, ball.color.g, ball.color.b = ball_colour(certainty(state.pointed_deviation))
-    ball.color.a = 1.0
-    arm = entity.lines.add(thickness=0.02)
-    arm.color.g = arm.color.a = 1.0
-    arm.pose.orientation.w = 1.0
-    for x, y, z in table.frame_from_table(state.estimate.pose[:9].reshape(3, 3)):
-        arm.points.add(x=x, y=y, z=z)
     return message
 
 
 def _location(position: Floats, deviation: Floats, table: TablePose) -> Location:
-    x, y, z = map(float, table.frame_from_table(position))
-    along = map(float, table.deviations(deviation))
-    return Location(x=x, y=y, z=z, **dict(zip(("x_deviation", "y_deviation", "z_deviation"), along, strict=True)))
+    x, y, z = table.frame_from_table(position)
+    along_x, along_y, along_z = table.deviations(deviation)
+    return Location(x=x, y=y, z=z, x_deviation=along_x, y_deviation=along_y, z_deviation=along_z)

@@ -31,7 +31,6 @@ class TrackedState:
         pointed_deviation, target_deviation: Along each axis, (3,), m, of `pointed` and of the detected target; the
             latter zeros if none is detected.
         n_views: How many cameras had a usable image at this time.
-        trouble: Which cameras had none, and why; "" if all had one.
     """
 
     captured_ns: int
@@ -42,7 +41,6 @@ class TrackedState:
     pointed_deviation: Floats
     target_deviation: Floats
     n_views: int
-    trouble: str
 
 
 def track_frame(tracker: ActionTracker, observer: ArmObserver, time_s: float) -> TrackEstimate:
@@ -184,9 +182,6 @@ class VideoTracker:
             if target is None
             else self._deviation(target.action, target.theta, target.covariance),
             n_views=sum(self._observer.has_image),
-            trouble="; ".join(
-                [*(f"{name} sends no images" for name in views.silent), *self._dark, *self._watch.rejected()]
-            ),
         )
         _learn(self._tracker, self._observer, estimate, elapsed_s)
 

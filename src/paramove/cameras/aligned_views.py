@@ -19,12 +19,10 @@ class Views(Generic[Item]):
     Attributes:
         captured_ns: Capture time of the set: the latest of its images.
         images: One for each camera in their order; None where that camera has no image of this instant.
-        silent: Names of the cameras that are gone.
     """
 
     captured_ns: int
     images: tuple[Item | None, ...]
-    silent: tuple[str, ...]
 
 
 class AlignedViews(Generic[Item]):
@@ -51,12 +49,7 @@ class AlignedViews(Generic[Item]):
         self._set_ns: int | None = None
 
     def add(self, name: str, captured_ns: int, image: Item) -> Iterator[Views[Item]]:
-        """The sets, at most two, that this image completes. A delayed image, no newer than the last set, is left out.
-
-        Raises ValueError for an unknown camera.
-        """
-        if name not in self._names:
-            raise ValueError(f"camera {name!r}: one of {', '.join(self._names)} expected")
+        """The sets, at most two, that this image completes. A delayed one, no newer than the last set, is left out."""
         if self._set_ns is not None and captured_ns <= self._set_ns - self._period_ns // 2:
             return
         self._started_ns = captured_ns if self._started_ns is None else self._started_ns
@@ -92,5 +85,4 @@ class AlignedViews(Generic[Item]):
             latest_ns = max(latest_ns, held[0])
         if self._set_ns is None or latest_ns > self._set_ns:
             self._set_ns = latest_ns
-            gone = (name for index, name in enumerate(self._names) if self._is_gone(index, latest_ns))
-            yield Views(latest_ns, tuple(images), tuple(gone))
+            yield Views(latest_ns, tuple(images))

@@ -55,10 +55,6 @@ class CameraWatch:
         for name in self._calibrated:  # from the first tick on
             self._received_ns.setdefault(name, now_ns)
 
-    def rejected(self) -> list[str]:
-        """Why the latest images of some cameras could not be used, one message each."""
-        return list(self._rejected.values())
-
     def troubles(self) -> list[str]:
         """All faults, one message each."""
         return [message for _, message in self._faults()]

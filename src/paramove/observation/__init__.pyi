@@ -3,6 +3,12 @@ from .arm_body import HAND as HAND
 from .arm_body import POSE_POINTS as POSE_POINTS
 from .arm_body import ArmSizes as ArmSizes
 from .arm_body import fitted_poses as fitted_poses
+from .arm_messages import GREEN as GREEN
+from .arm_messages import add_circle as add_circle
+from .arm_messages import line_in_image as line_in_image
+from .arm_messages import line_in_scene as line_in_scene
+from .arm_messages import opaque as opaque
+from .arm_messages import pose_message as pose_message
 from .arm_movement import ArmMovement as ArmMovement
 from .arm_movement import reconstructed as reconstructed
 from .arm_observer import ArmObserver as ArmObserver
@@ -11,10 +17,8 @@ from .body_key_points import ARM_POINTS as ARM_POINTS
 from .body_key_points import BodyKeyPoints as BodyKeyPoints
 from .body_key_points import key_points_from as key_points_from
 from .body_key_points import key_points_message as key_points_message
-from .body_messages import arm_pose_message as arm_pose_message
-from .body_messages import outline_message as outline_message
-from .body_messages import scene_message as scene_message
 from .body_tracking import BodyTrackingSetup as BodyTrackingSetup
+from .body_tracking import body_messages as body_messages
 from .key_point_observer import KeyPointObserver as KeyPointObserver
 from .key_point_observer import KeyPointOptions as KeyPointOptions
 from .key_point_stream import detected_key_points as detected_key_points

@@ -1,4 +1,4 @@
-"""The stereo body tracker on streams of images: aligns the images in time, locates the arm, and reports problems."""
+"""The stereo body tracker on streams of images: aligns them, locates the arm, makes its messages, reports problems."""
 
 from __future__ import annotations
 
@@ -6,13 +6,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from paramove.cameras import AlignedViews, CalibratedCamera, CameraWatch, Views, measured_cameras
 from paramove.documents import Image, InputError
+from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.objects import Colour
+from paramove.observation.arm_messages import GREEN, add_circle, line_in_image, line_in_scene, pose_message
 from paramove.observation.markers import ArucoMarker, BodyTrackerOptions, MarkedPoint, StereoBodyTracker
 
+ALONG_THE_ARM = ("sternum", "shoulder", "elbow", "wrist", "knuckle", "index")
 UNDETECTED_S = 3.0
 """A point that two cameras have not detected for this long is reported. A hand below the table returns sooner."""
 
@@ -38,27 +44,21 @@ class BodyTracking:
         options: What marks which point.
         period_s: Time between two images of a camera, s.
 
+    Attributes:
+        cameras: By their names.
+        point_names: Of the marked points.
+
     Raises StereoError for fewer than two cameras, InputError for duplicate markers or none.
     """
 
     def __init__(self, cameras: Sequence[CalibratedCamera], options: BodyTrackerOptions, period_s: float) -> None:
         self._tracker = StereoBodyTracker(cameras, options)
-        self._calibrated = {camera.name: camera for camera in cameras}
-        self._views = AlignedViews[Image](list(self._calibrated), period_s)
-        self._names = tuple(options.markers)
+        self.cameras = {camera.name: camera for camera in cameras}
+        self.point_names = tuple(options.markers)
+        self._views = AlignedViews[Image](list(self.cameras), period_s)
         self._watch = CameraWatch(cameras, period_s)
         self._detected_ns: dict[str, int] = {}
         self._latest_ns = 0
-
-    @property
-    def cameras(self) -> dict[str, CalibratedCamera]:
-        """By their names."""
-        return self._calibrated
-
-    @property
-    def point_names(self) -> tuple[str, ...]:
-        """Of the marked points."""
-        return self._names
 
     def see(self, camera: str, captured_ns: int, image: Image) -> Iterator[BodyPoints]:
         """The points at each time that this image of a calibrated camera completes.
@@ -84,7 +84,7 @@ class BodyTracking:
     def _located(self, views: Views[Image]) -> BodyPoints:
         points = self._tracker.located(views.images)
         self._latest_ns = views.captured_ns
-        for name in self._names:
+        for name in self.point_names:
             self._detected_ns.setdefault(name, views.captured_ns)
             if name in points:
                 self._detected_ns[name] = views.captured_ns
@@ -99,6 +99,22 @@ class BodyTracking:
         if not names:
             return []
         return [f"fewer than two cameras see {', '.join(names)}: turn the markers to the cameras, or check the light"]
+
+
+def body_messages(body: BodyPoints, camera: CalibratedCamera) -> tuple[ArmPose, ImageAnnotations, SceneUpdate]:
+    """All that is published of a time; the points are drawn joined by a line, in a camera's image and in the world."""
+    positions = {name: point.position for name, point in body.points.items()}
+    along = [positions[name] for name in sorted(positions, key=_from_the_body)]
+    pixels = [pixel for pixel in map(camera.project, along) if np.isfinite(pixel).all()]
+    outline = line_in_image(body.captured_ns, pixels, GREEN, closed=False)
+    for pixel in pixels:
+        add_circle(outline, pixel, 5.0, GREEN)
+    return pose_message(body.captured_ns, positions), outline, line_in_scene(body.captured_ns, "arm", along)
+
+
+def _from_the_body(name: str) -> int:
+    """Place of a point from the body to the end of the hand; unknown names are last."""
+    return ALONG_THE_ARM.index(name) if name in ALONG_THE_ARM else len(ALONG_THE_ARM)
 
 
 class MarkerSetup(BaseModel):

@@ -13,10 +13,11 @@ from typing import Any
 import cv2
 import numpy as np
 
-from paramove.cameras import MARKERS, UNSIZED_BOARD_ID, WORLD_FRAME, CalibratedCamera, StereoRig, dictionary
+from paramove.cameras import MARKERS, UNSIZED_BOARD_ID, CalibratedCamera, StereoRig, dictionary
 from paramove.documents import Floats, Image, InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.objects import Colour, ColourTracker
+from paramove.observation.arm_messages import pose_message
 
 BOARD_IDS = UNSIZED_BOARD_ID + MARKERS
 """Smaller ids are those of calibration boards, which may lie on the table at the same time."""
@@ -64,14 +65,10 @@ class BodyTrackerOptions:
     Attributes:
         markers: Name of a body point -> its marker, or its colour, which nothing else in view may have.
         max_residual_px: A point whose views disagree by more (root mean square) is a wrong match and rejected.
-        sigma_px: Standard deviation of a marker's position in an image.
-        frame: Name of the frame that the cameras were calibrated in.
     """
 
     markers: Mapping[str, ArucoMarker | Colour] = field(default_factory=lambda: dict(DEFAULT_MARKERS))
     max_residual_px: float = 3.0
-    sigma_px: float = 0.5
-    frame: str = WORLD_FRAME
 
 
 @dataclass(frozen=True)
@@ -118,12 +115,7 @@ class StereoBodyTracker:
 
         Raises InputError for another number of images, and for an image of another size than calibrated.
         """
-        pose = ArmPose(frame=self._options.frame)
-        pose.captured.FromNanoseconds(captured_ns)
-        for name, point in self.located(images).items():
-            x, y, z = point.position
-            pose.points.add(name=name, x=x, y=y, z=z)
-        return pose
+        return pose_message(captured_ns, {name: point.position for name, point in self.located(images).items()})
 
     def located(self, images: Sequence[Image | None]) -> dict[str, MarkedPoint]:
         """The points with their uncertainty, in the order of the options; arguments as for `update`."""
@@ -156,7 +148,7 @@ class StereoBodyTracker:
                 if int(number) in rows:
                     at = rows[int(number)]
                     pixels[view, at : at + 4] = of_marker.reshape(4, 2)
-        triangulated = self._rig.triangulate(pixels, self._options.sigma_px)
+        triangulated = self._rig.triangulate(pixels)
         points = {}
         for row, (name, marker) in enumerate(self._aruco.items()):
             own = slice(4 * row, 4 * row + 4)
@@ -177,7 +169,7 @@ class StereoBodyTracker:
         for view, (image, tracker) in enumerate(zip(images, self._trackers, strict=False)):
             for region in [] if image is None else tracker.update(image).objects:
                 pixels[view, names.index(region.name)] = region.u_px, region.v_px
-        triangulated = self._rig.triangulate(pixels, self._options.sigma_px)
+        triangulated = self._rig.triangulate(pixels)
         rows = zip(names, triangulated.points, triangulated.deviations, triangulated.residuals_px, strict=True)
         return {
             name: MarkedPoint(position, float(deviation), float(residual_px))

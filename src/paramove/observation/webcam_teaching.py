@@ -7,13 +7,12 @@ position that is touched is known, so it anchors the movement in space and is it
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.cameras import WORLD_FRAME, AlignedViews, CalibratedCamera
+from paramove.cameras import WORLD_FRAME, AlignedViews, CalibratedCamera, Views
 from paramove.demonstrations import DemonstrationError, TaughtSet, moved_part
 from paramove.documents import Floats, InputError
 from paramove.observation.arm_body import ArmSizes
@@ -42,12 +41,6 @@ MAX_STRANGE = 0.3
 LONGEST_S = 10.0
 SAME_M = 0.01
 """Positions that are nearer to each other are one."""
-
-
-@dataclass(frozen=True)
-class _Detected:
-    at_ns: int
-    points: tuple[BodyKeyPoints | None, ...]
 
 
 class WebcamTeacher:
@@ -82,7 +75,7 @@ class WebcamTeacher:
         self._taught, self._sizes, self._shoulder = taught, sizes, shoulder
         self._names = [camera.name for camera in cameras]
         self._views = AlignedViews[BodyKeyPoints](self._names, 1.0 / rate_hz)
-        self._track: list[_Detected] = []
+        self._track: list[Views[BodyKeyPoints]] = []
         self._resting: Floats | None = None
         self._is_out = False
         self._done = 0
@@ -105,17 +98,17 @@ class WebcamTeacher:
         happened = ""
         for views in self._views.add(camera, captured_ns, points):
             if not self.finished:
-                self._track.append(_Detected(views.captured_ns, views.images))
+                self._track.append(views)
                 happened = self._judged() or happened
         return happened
 
     def _judged(self) -> str:
         """Follows rest, movement, touch and return by the hand in the first image."""
-        while self._track[-1].at_ns - self._track[0].at_ns > LONGEST_S * 1e9:
+        while self._track[-1].captured_ns - self._track[0].captured_ns > LONGEST_S * 1e9:
             self._track.pop(0)
-        recent = [one for one in self._track if self._track[-1].at_ns - one.at_ns <= STILL_S * 1e9]
+        recent = [one for one in self._track if self._track[-1].captured_ns - one.captured_ns <= STILL_S * 1e9]
         hands = np.array([_hand(one) for one in recent])
-        long_enough = len(recent) > 2 and recent[-1].at_ns - recent[0].at_ns >= 0.8 * STILL_S * 1e9
+        long_enough = len(recent) > 2 and recent[-1].captured_ns - recent[0].captured_ns >= 0.8 * STILL_S * 1e9
         hand = _still(hands) if long_enough else None
         if hand is None:
             return ""
@@ -144,9 +137,9 @@ class WebcamTeacher:
         self._ask(self._done + 1)
         return f"{recording}: {name} touched"
 
-    def _reconstructed(self, track: Sequence[_Detected], target: Floats) -> ArmMovement:
-        times = np.array([one.at_ns - track[0].at_ns for one in track]) * 1e-9
-        points = [[one.points[number] for one in track] for number in range(len(self._cameras))]
+    def _reconstructed(self, track: Sequence[Views[BodyKeyPoints]], target: Floats) -> ArmMovement:
+        times = np.array([one.captured_ns - track[0].captured_ns for one in track]) * 1e-9
+        points = [[one.images[number] for one in track] for number in range(len(self._cameras))]
         known = partial(
             reconstructed, self._cameras, times, points, sizes=self._sizes, shoulder=self._shoulder,
             hangs_until_s=0.5 * STILL_S,
@@ -223,7 +216,7 @@ def _still(hands: Floats) -> Floats | None:
     return hand if near.sum() >= MIN_STILL * len(hands) else None
 
 
-def _hand(detected: _Detected) -> Floats:
+def _hand(detected: Views[BodyKeyPoints]) -> Floats:
     """Of the right arm in the first image, in deviations."""
-    first = detected.points[0]
+    first = detected.images[0]
     return np.full(2, np.nan) if first is None else first.positions[0, 3] / first.deviations[0, 0]
