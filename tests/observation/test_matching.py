@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from paramove.observation import ArmObserver, ArmSizes, ObservationOptions
+from paramove.observation import ArmSizes, ObservationOptions, fitted_poses
 from paramove.observation.contour_kernels import EVERY, NORMAL_STEP, fill_segments, new_contour, place_key_points
 from paramove.observation.edge_images import EdgeImages
 from paramove.observation.edge_kernels import DIRECTIONS, MARGIN
-from paramove.observation.likelihood_kernels import outline
+from paramove.observation.likelihood_kernels import SCRATCH, outline, strengths
 from paramove.observation.matching_kernels import STEP_BITS, begin, match, new_shifts
+from paramove.observation.segment_sums import LANES
 from paramove.observation.silhouette_kernels import new_canvas
 from tests.observation.scenes import cluttered, displaced
 from tests.observation.test_silhouette import BODY, drawn, kernel_camera
@@ -161,22 +162,31 @@ def test_the_matching_comes_near_to_the_exact_optimum(edges):
     assert min(shares) > 0.8
 
 
+def matched(pose, edges):
+    """Compared points of the outline, px, the same after the matching, their shifts, and the mean strength there."""
+    contour, points, number = prepared(fitted_poses(pose[None], ArmSizes())[0])
+    full, shifts = Objective(contour, number, edges), new_shifts(number + 1)
+    match(edges.distances.reshape(-1), edges.stride, number, points, UNIT, contour, shifts)
+    values = np.empty((SCRATCH, len(contour.lanes[0])), np.float32)
+    strengths(edges.intensities.reshape(-1), edges.stride, number, 0.03, contour, shifts, values)
+    s, before = full.between(shifts.shift[:number].astype(float)), full.pixels + 0.5 * full.n
+    return before, before + s[:, None] * full.n, s, values[0, LANES : (number + 1) * LANES].sum() / points
+
+
 def test_the_matching_moves_a_displaced_contour_onto_the_arm(edges):
     """Shifted 1.2 cm in any direction across the view, the matched contour lies where the true one does."""
-    observer = ArmObserver(ArmSizes(), [CAMERA], threads=1)
-    observer.look([cluttered(drawn(TRUE, CAMERA))])
     sideways, downward = CAMERA.camera_from_world[:2, :3]
     turns = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
     shifts = 0.012 * (np.cos(turns)[:, None] * sideways + np.sin(turns)[:, None] * downward)
-    moved = [observer.match(TRUE + np.tile(shift, 3), 0) for shift in shifts]
-    truth = observer.match(TRUE, 0)
-    between = 0.5 * (truth.contour + np.roll(truth.contour, -1, axis=0))
-    line = np.concatenate([truth.contour, between])
+    moved = [matched(TRUE + np.tile(shift, 3), edges) for shift in shifts]
+    contour, _, own_shifts, strength = matched(TRUE, edges)
+    between = 0.5 * (contour + np.roll(contour, -1, axis=0))
+    line = np.concatenate([contour, between])
 
     def apart(points):
         return np.linalg.norm(points[:, None] - line[None], axis=2).min(axis=1).mean()
 
-    assert np.mean([apart(one.contour) for one in moved]) > 1.9
-    assert np.mean([apart(one.matched) for one in moved]) < 1.0
-    assert np.abs(truth.shifts).mean() < 0.5
-    assert truth.strengths.mean() > 0.9 > 0.6 > np.mean([one.strengths.mean() for one in moved]) - 0.35
+    assert np.mean([apart(before) for before, _, _, _ in moved]) > 1.9
+    assert np.mean([apart(after) for _, after, _, _ in moved]) < 1.0
+    assert np.abs(own_shifts).mean() < 0.5
+    assert strength > 0.9 > 0.6 > np.mean([one for _, _, _, one in moved]) - 0.35

@@ -119,6 +119,15 @@ class CalibratedCamera:
             result[known] = ideal.reshape(-1, 2)
         return result
 
+    def check_image(self, image: Image) -> None:
+        """Raises InputError unless an image is (H, W, 3) uint8 as calibrated."""
+        expected = (self.height_px, self.width_px, 3)
+        if image.shape != expected or image.dtype != np.uint8:
+            raise InputError(
+                f"camera {self.name!r}: expected an image of shape {expected} and type uint8, as calibrated; found "
+                f"{image.shape} and {image.dtype}"
+            )
+
     def undistort(self, image: Image) -> Image:
         """The image (H, W) or (H, W, C) with the lens distortion removed; the camera matrix is the same."""
         if image.shape[:2] != (self.height_px, self.width_px):

@@ -12,7 +12,6 @@ from .arm_messages import pose_message as pose_message
 from .arm_movement import ArmMovement as ArmMovement
 from .arm_movement import reconstructed as reconstructed
 from .arm_observer import ArmObserver as ArmObserver
-from .arm_observer import ContourMatch as ContourMatch
 from .body_key_points import ARM_POINTS as ARM_POINTS
 from .body_key_points import BodyKeyPoints as BodyKeyPoints
 from .body_key_points import key_points_from as key_points_from

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import cv2
 import numpy as np
@@ -18,45 +17,17 @@ from paramove.documents import Floats, Image, InputError
 from paramove.observation.arm_body import ArmSizes, fitted_poses
 from paramove.observation.background import Background
 from paramove.observation.background_kernels import FULL
-from paramove.observation.contour_kernels import EVERY, Contour, fill_segments, new_contour, place_key_points
+from paramove.observation.contour_kernels import new_contour
 from paramove.observation.edge_images import EdgeImages
 from paramove.observation.edge_kernels import DIRECTIONS
-from paramove.observation.likelihood_kernels import (
-    SCRATCH,
-    matched_errors,
-    outline,
-    plain_errors,
-    silhouette,
-    strengths,
-)
-from paramove.observation.matching_kernels import match, new_shifts
+from paramove.observation.likelihood_kernels import matched_errors, outline, plain_errors, silhouette
 from paramove.observation.options import ObservationOptions
 from paramove.observation.presence import Presence, presence_in_view
-from paramove.observation.segment_sums import FRACTION, LANES, NX, NY
 from paramove.observation.silhouette_kernels import Camera, new_canvas
 
 MIN_AREA_PX = 200.0
 CHUNK = 50
 """Maximum number of postures that a thread takes at a time: their silhouettes use one canvas."""
-
-
-@dataclass(frozen=True)
-class ContourMatch:
-    """One posture's contour in one view and where it was matched, px of the image as captured.
-
-    Attributes:
-        contour: the compared points of the outline of the projected arm, (N, 2).
-        matched: the same points shifted along their normals, (N, 2).
-        shifts: s_i, px of the compared image, (N,).
-        strengths: G+ of each point, (N,), 0 to 1.
-        energy: E of (6.26).
-    """
-
-    contour: Floats
-    matched: Floats
-    shifts: Floats
-    strengths: Floats
-    energy: float
 
 
 @dataclass
@@ -146,7 +117,7 @@ class ArmObserver:
             raise InputError(f"expected {len(self._views)} images, None for a missing one; found {len(images)}")
         given = [(view, image) for view, image in zip(self._views, images, strict=True) if image is not None]
         for view, image in given:
-            _check(view.camera, image)
+            view.camera.check_image(image)
         self._run([partial(_see, view, image) for view, image in given])
         step = -(-DIRECTIONS // self.threads)
         self._run(
@@ -239,12 +210,9 @@ class ArmObserver:
             plain_errors(poses, self._body, view.kernel, distances, errors)
         else:
             change = view.background.change if view.background is not None else self._unchanged
+            numbers = (self.options.key_point_px, self.options.shift_unit, self.options.min_background)
             images = (intensities, distances)
-            matched_errors(poses, self._body, view.kernel, *images, self._numbers, change, errors, regions)
-
-    @property
-    def _numbers(self) -> tuple[float, float, float]:
-        return self.options.key_point_px, self.options.shift_unit, self.options.min_background
+            matched_errors(poses, self._body, view.kernel, *images, numbers, change, errors, regions)
 
     def _run(self, jobs: Sequence[Callable[[], None]]) -> None:
         """Run all jobs, which release the interpreter lock, on the threads; raises what a job raises."""
@@ -257,52 +225,12 @@ class ArmObserver:
 
     def outline(self, pose: ArrayLike, view: int) -> Floats:
         """The contour of the fitted arm in a view, (N, 2), px of the image as captured; (0, 2) if out of sight."""
-        contour, count = self._contour(pose, view)
-        return self._captured(view, np.stack([contour.x[:count], contour.y[:count]], axis=1).astype(np.float64))
-
-    def match(self, pose: ArrayLike, view: int) -> ContourMatch | None:
-        """The matching of one posture in one view, as for its likelihood; None if it is out of sight.
-
-        Raises InputError if that view has no image or the likelihood is the simple one.
-        """
-        edges = self._views[view].edges
-        if not self._views[view].has_image or self.options.likelihood == "simple":
-            raise InputError(f"view {view} has no image to match with, or the likelihood is 'simple'")
-        contour, count = self._contour(pose, view)
-        if count == 0:
-            return None
-        number = place_key_points(count, self.options.key_point_px, contour)
-        points = fill_segments(number, len(edges.distances[0]), contour)
-        shifts, values = new_shifts(number + 1), np.empty((SCRATCH, len(contour.lanes[0])), np.float32)
-        unit, minimum = self._numbers[1:]
-        energy = match(edges.distances.reshape(-1), edges.stride, number, points, unit, contour, shifts)
-        strengths(edges.intensities.reshape(-1), edges.stride, number, minimum, contour, shifts, values)
-        return self._matched(view, number, contour, shifts.shift, values, energy)
-
-    def _matched(self, view: int, number: int, contour: Contour, s: Any, values: Any, energy: float) -> ContourMatch:
-        """The matching of a contour without the points with which the kernels fill up segments."""
-        lane = np.arange(LANES)
-        filled = EVERY * lane < np.diff(contour.starts[: number + 1])[:, None]
-        compared = (contour.starts[:number, None] + EVERY * lane)[filled]
-        rows = contour.lanes[:, LANES : (number + 1) * LANES].reshape(-1, number, LANES)[:, filled].astype(np.float64)
-        segment = np.nonzero(filled)[0]
-        moved = (1.0 - rows[FRACTION]) * s[segment] + rows[FRACTION] * s[(segment + 1) % number]
-        normals = np.stack([rows[NX], rows[NY]], axis=1)
-        edge = np.stack([contour.x[compared], contour.y[compared]], axis=1) + 0.5 * normals
-        matched = edge + moved[:, None] * normals
-        strength = values[0, LANES : (number + 1) * LANES].reshape(number, LANES)[filled].astype(np.float64)
-        return ContourMatch(self._captured(view, edge), self._captured(view, matched), moved, strength, float(energy))
-
-    def _contour(self, pose: ArrayLike, view: int) -> tuple[Contour, int]:
-        kernel = self._views[view].kernel
+        camera, small, kernel = self._views[view].camera, self._views[view].small, self._views[view].kernel
         fitted = fitted_poses(np.reshape(pose, (1, -1)), self.sizes)[0]
-        contour = new_contour(kernel.width, kernel.height)
-        if not np.isfinite(fitted).all():
-            return contour, 0
-        return contour, outline(fitted, self._body, kernel, new_canvas(kernel.width, kernel.height), contour)
-
-    def _captured(self, view: int, points: Floats) -> Floats:
-        camera, small = self._views[view].camera, self._views[view].small
+        contour, count = new_contour(kernel.width, kernel.height), 0
+        if np.isfinite(fitted).all():
+            count = outline(fitted, self._body, kernel, new_canvas(kernel.width, kernel.height), contour)
+        points = np.stack([contour.x[:count], contour.y[:count]], axis=1).astype(np.float64)
         scale = np.array([camera.width_px / small.width_px, camera.height_px / small.height_px])
         return camera.distort((points + 0.5) * scale - 0.5)
 
@@ -318,14 +246,6 @@ def _table_mask(camera: CalibratedCamera, corners: Floats | None) -> NDArray[np.
         cv2.fillPoly(inside, [np.clip(corners_px, -1e4, 1e4).round().astype(np.int32)], 1)
         mask[1:-1, 1:-1] = inside
     return mask.reshape(-1)
-
-
-def _check(camera: CalibratedCamera, image: Image) -> None:
-    if image.dtype != np.uint8 or image.shape != (camera.height_px, camera.width_px, 3):
-        raise InputError(
-            f"camera {camera.name!r}: expected an image of shape ({camera.height_px}, {camera.width_px}, 3) and type "
-            f"uint8, as calibrated; found {image.shape} and {image.dtype}"
-        )
 
 
 def _see(view: _View, image: Image) -> None:

@@ -80,10 +80,8 @@ def key_points_message(points: BodyKeyPoints, captured_ns: int) -> BodyKeyPoints
     for name, at in NAMES.items():
         x, y = points.positions[at]
         if np.isfinite((x, y)).all():
-            values = (points.deviations[at], points.depths[at], points.certainties[at])
-            message.points.add(
-                name=name, x=x, y=y, **dict(zip(("deviation", "depth", "certainty"), values, strict=True))
-            )
+            deviation, depth, certainty = points.deviations[at], points.depths[at], points.certainties[at]
+            message.points.add(name=name, x=x, y=y, deviation=deviation, depth=depth, certainty=certainty)
     return message
 
 

@@ -119,21 +119,14 @@ class StereoBodyTracker:
 
     def located(self, images: Sequence[Image | None]) -> dict[str, MarkedPoint]:
         """The points with their uncertainty, in the order of the options; arguments as for `update`."""
-        self._check(images)
-        points = self._aruco_points(images) | self._colour_points(images)
-        return {name: points[name] for name in self._options.markers if name in points}
-
-    def _check(self, images: Sequence[Image | None]) -> None:
         cameras = self._rig.cameras
         if len(images) != len(cameras):
             raise InputError(f"expected one image of each of {len(cameras)} cameras, found {len(images)}")
         for image, camera in zip(images, cameras, strict=True):
-            expected = (camera.height_px, camera.width_px, 3)
-            if image is not None and (image.shape != expected or image.dtype != np.uint8):
-                raise InputError(
-                    f"camera {camera.name!r}: expected an image of shape {expected} and type uint8, as calibrated; "
-                    f"found {image.shape} and {image.dtype}"
-                )
+            if image is not None:
+                camera.check_image(image)
+        points = self._aruco_points(images) | self._colour_points(images)
+        return {name: points[name] for name in self._options.markers if name in points}
 
     def _aruco_points(self, images: Sequence[Image | None]) -> dict[str, MarkedPoint]:
         """The middle of each marker's corners in space, moved inwards against the marker's normal."""
