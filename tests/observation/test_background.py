@@ -9,8 +9,7 @@ import pytest
 from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.arm_observer import ArmObserver
-from paramove.observation.background import Background
-from paramove.observation.background_kernels import FULL
+from paramove.observation.background import FULL, Background
 from paramove.observation.options import ObservationOptions
 from paramove.observation.presence import Presence
 from tests.observation.views import four_cameras, some_poses

@@ -5,8 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from paramove.observation import ObservationOptions
-from paramove.observation.edge_images import REACH_PX, EdgeImages
-from paramove.observation.edge_kernels import BINS_PER_LEVEL, DIRECTIONS, MARGIN
+from paramove.observation.edge_images import BINS_PER_LEVEL, DIRECTIONS, MARGIN, REACH_PX, EdgeImages
 
 PLAIN = ObservationOptions(smoothing_px=0.0, width_px=64, height_px=48)
 

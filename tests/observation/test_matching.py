@@ -6,8 +6,7 @@ from numpy.testing import assert_allclose
 
 from paramove.observation import ArmSizes, ObservationOptions, fitted_poses
 from paramove.observation.contour_kernels import EVERY, NORMAL_STEP, fill_segments, new_contour, place_key_points
-from paramove.observation.edge_images import EdgeImages
-from paramove.observation.edge_kernels import DIRECTIONS, MARGIN
+from paramove.observation.edge_images import DIRECTIONS, MARGIN, EdgeImages
 from paramove.observation.likelihood_kernels import SCRATCH, outline, strengths
 from paramove.observation.matching_kernels import STEP_BITS, begin, match, new_shifts
 from paramove.observation.segment_sums import LANES

@@ -36,8 +36,8 @@ from .network_files import stored_network as stored_network
 from .options import Likelihood as Likelihood
 from .options import ObservationOptions as ObservationOptions
 from .person_measures import MeasuredArm as MeasuredArm
+from .person_measures import PersonSetUp as PersonSetUp
 from .person_measures import measured_arm as measured_arm
-from .person_set_up import PersonSetUp as PersonSetUp
 from .pose_detection import PoseDetection as PoseDetection
 from .pose_network import PoseNetwork as PoseNetwork
 from .presence import Presence as Presence

@@ -15,11 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from paramove.cameras import CalibratedCamera
 from paramove.documents import Floats, Image, InputError
 from paramove.observation.arm_body import ArmSizes, fitted_poses
-from paramove.observation.background import Background
-from paramove.observation.background_kernels import FULL
+from paramove.observation.background import FULL, Background
 from paramove.observation.contour_kernels import new_contour
-from paramove.observation.edge_images import EdgeImages
-from paramove.observation.edge_kernels import DIRECTIONS
+from paramove.observation.edge_images import DIRECTIONS, EdgeImages
 from paramove.observation.likelihood_kernels import matched_errors, outline, plain_errors, silhouette
 from paramove.observation.options import ObservationOptions
 from paramove.observation.presence import Presence, presence_in_view

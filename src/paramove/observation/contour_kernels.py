@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from paramove.documents import Bytes
 from paramove.hmm import compiled, compiled_arithmetic
-from paramove.observation.edge_kernels import COSINES, DIRECTIONS, MARGIN, SINES
+from paramove.observation.edge_images import COSINES, DIRECTIONS, MARGIN, SINES
 from paramove.observation.segment_sums import BASE, FIELDS, FRACTION, LANES, NX, NY, PX, PY
 
 Floats32 = NDArray[np.float32]

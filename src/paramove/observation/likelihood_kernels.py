@@ -5,7 +5,6 @@ from numpy.typing import NDArray
 
 from paramove.documents import Bytes, Floats
 from paramove.hmm import compiled, compiled_arithmetic, compiled_sums
-from paramove.observation.background_kernels import covered
 from paramove.observation.contour_kernels import (
     MIN_POINTS,
     Contour,
@@ -14,7 +13,7 @@ from paramove.observation.contour_kernels import (
     place_key_points,
     trace,
 )
-from paramove.observation.edge_kernels import MARGIN
+from paramove.observation.edge_images import MARGIN
 from paramove.observation.matching_kernels import Shifts, match, new_shifts
 from paramove.observation.segment_sums import BASE, FRACTION, LANES, NX, NY, PX, PY
 from paramove.observation.silhouette_kernels import Camera, Canvas, draw_arm, new_canvas, wipe
@@ -53,6 +52,23 @@ def outline_over(
         total, area = covered(canvas.mask, change, top, bottom, camera.width, canvas.left, canvas.right)
         wipe(top, bottom, camera.width, canvas)
     return count if count >= MIN_POINTS else 0, total, area
+
+
+@compiled
+def covered(mask: Bytes, change: Signed, top: int, bottom: int, width: int, left: NDArray[np.int32],
+            right: NDArray[np.int32]) -> tuple[int, int]:  # fmt: skip
+    """Sum of the changes under a silhouette and its area, px; mask and change flat with a border of one pixel."""
+    total, area = np.int32(0), np.int32(0)
+    for y in range(top, bottom + 1):
+        offset = (y + 1) * (width + 2) + 1
+        inside, changed = (
+            mask[offset + left[y] : offset + right[y] + 1],
+            change[offset + left[y] : offset + right[y] + 1],
+        )
+        for x in range(len(inside)):
+            total += np.int32(inside[x]) * np.int32(changed[x])
+            area += np.int32(inside[x])
+    return int(total), int(area)
 
 
 @compiled

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from paramove.cameras import CalibratedCamera
 from paramove.documents import Floats
 from paramove.observation.arm_body import HAND
-from paramove.observation.background_kernels import FULL
+from paramove.observation.background import FULL
 
 AXIS_FRACTIONS = np.linspace(0.25, 0.95, 15)
 """Positions on the line from elbow over the wrist to the fingertip that must be visible, as fractions of it."""
