@@ -26,6 +26,7 @@ from .charuco_board import dictionary as dictionary
 from .charuco_sheet import PAPERS as PAPERS
 from .charuco_sheet import board_sheet as board_sheet
 from .charuco_sheet import marker_sheet as marker_sheet
+from .frame_sources import PICTURES as PICTURES
 from .frame_sources import DeviceFrames as DeviceFrames
 from .frame_sources import FileFrames as FileFrames
 from .frame_sources import open_source as open_source
@@ -39,6 +40,5 @@ from .frames import image_of_raw as image_of_raw
 from .placement import Placement as Placement
 from .placement import board_depth as board_depth
 from .placement import place_camera as place_camera
-from .replayed_frames import PICTURES as PICTURES
 from .stereo import StereoRig as StereoRig
 from .watch import CameraWatch as CameraWatch

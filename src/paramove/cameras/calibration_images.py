@@ -6,8 +6,9 @@ table, for the camera's pose.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
@@ -66,20 +67,17 @@ class FolderImages:
         self._paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
         if not self._paths:
             raise InputError(f"no image in {folder}: {', '.join(IMAGE_SUFFIXES)} expected", missing=True)
-        self._views: list[tuple[Path, BoardView | None]] | None = None
 
     def held(self) -> Found:
-        return self._matching(lambda path: True)
+        return _found(self._views.values())
 
     def table(self) -> Found:
-        return self._matching(lambda path: path.name.lower().startswith(TABLE_PREFIX))
+        return _found(view for path, view in self._views.items() if path.name.lower().startswith(TABLE_PREFIX))
 
-    def _matching(self, selected: Callable[[Path], bool]) -> Found:
-        if self._views is None:
-            finder = BoardFinder()
-            self._views = [(path, finder.find(read_picture(path), path.name)) for path in self._paths]
-        looked_at = [view for path, view in self._views if selected(path)]
-        return Found(tuple(view for view in looked_at if view is not None), len(looked_at))
+    @cached_property
+    def _views(self) -> dict[Path, BoardView | None]:
+        finder = BoardFinder()
+        return {path: finder.find(read_picture(path), path.name) for path in self._paths}
 
 
 class VideoImages:
@@ -91,29 +89,19 @@ class VideoImages:
     def __init__(self, path: Path) -> None:
         self.name = path.stem
         self._path = path
-        self._found: tuple[Found, Found] | None = None
 
     def held(self) -> Found:
-        return self._both()[0]
+        collector = ViewCollector()
+        for _, view in self._looks:
+            collector.offer(view)
+        return Found(tuple(collector.views), len(self._looks))
 
     def table(self) -> Found:
-        return self._both()[1]
+        return _found(view for time_s, view in self._looks if time_s > self._looks[-1][0] - TABLE_S)
 
-    def _both(self) -> tuple[Found, Found]:
-        if self._found is None:
-            looks, last_s = [], -1.0
-            finder = BoardFinder()
-            for time_s, image in _video(self._path):
-                if time_s - last_s >= 1.0 / LOOKS_PER_S - 1e-3:
-                    looks.append((time_s, finder.find(image, f"{self._path.name} at {time_s:.1f} s")))
-                    last_s = time_s
-            collector = ViewCollector()
-            for _, view in looks:
-                collector.offer(view)
-            at_end = [view for time_s, view in looks if time_s > last_s - TABLE_S]
-            lying = tuple(view for view in at_end if view is not None)
-            self._found = Found(tuple(collector.views), len(looks)), Found(lying, len(at_end))
-        return self._found
+    @cached_property
+    def _looks(self) -> list[tuple[float, BoardView | None]]:
+        return list(_looks(self._path.name, _video(self._path)))
 
 
 class LiveImages:
@@ -129,13 +117,12 @@ class LiveImages:
         self.name = name
         self._frames = frames
         self._say = say
-        self._finder = BoardFinder()
 
     def held(self) -> Found:
         """Views of the board in front of the camera, the table's included. Raises InputError."""
         collector, looked_at, latest_s = ViewCollector(), 0, None
         self._say(f"{self.name}: hold the board in front of the camera, briefly still, each time at another angle")
-        for time_s, view in self._looks():
+        for time_s, view in _looks(self.name, self._frames):
             looked_at += 1
             latest_s = time_s if latest_s is None else latest_s
             if collector.offer(view):
@@ -155,7 +142,7 @@ class LiveImages:
         self._say(f"{self.name}: waiting until the board lies still on the table")
         lying: list[BoardView] = []
         start_s = None
-        for looked_at, (time_s, view) in enumerate(self._looks(), 1):
+        for looked_at, (time_s, view) in enumerate(_looks(self.name, self._frames), 1):
             start_s = time_s if start_s is None else start_s
             still = view is not None and (not lying or _motion(view, lying[0]) < 0.2 * STILL_FRACTION)
             lying = [*lying, view] if still and view is not None else []
@@ -164,13 +151,6 @@ class LiveImages:
             if time_s - start_s > TIMEOUT_S:
                 break
         raise CalibrationError(f"{self.name}: the board on the table was not detected lying still for {TIMEOUT_S:g} s")
-
-    def _looks(self) -> Iterator[tuple[float, BoardView | None]]:
-        last_s = -np.inf
-        for time_s, image in self._frames:
-            if time_s - last_s >= 1.0 / LOOKS_PER_S - 1e-3:
-                last_s = time_s
-                yield time_s, self._finder.find(image, f"{self.name} at {time_s:.1f} s")
 
 
 class ViewCollector:
@@ -189,6 +169,20 @@ class ViewCollector:
             return False
         self.views.append(view)
         return True
+
+
+def _looks(name: str, frames: Iterable[tuple[float, Image]]) -> Iterator[tuple[float, BoardView | None]]:
+    """Time, s, and view of the board, if it is there, in as many frames as `LOOKS_PER_S`."""
+    finder, last_s = BoardFinder(), -np.inf
+    for time_s, image in frames:
+        if time_s - last_s >= 1.0 / LOOKS_PER_S - 1e-3:
+            last_s = time_s
+            yield time_s, finder.find(image, f"{name} at {time_s:.1f} s")
+
+
+def _found(looks: Iterable[BoardView | None]) -> Found:
+    looked_at = list(looks)
+    return Found(tuple(view for view in looked_at if view is not None), len(looked_at))
 
 
 def _motion(view: BoardView, other: BoardView) -> float:

@@ -34,10 +34,6 @@ class CameraSocket:
             self._socket.close()
             raise
 
-    def isOpened(self) -> bool:  # noqa: N802
-        """Whether somebody offers images."""
-        return True
-
     def grab(self) -> bool:
         """Waits for an image; False once there will be none any more."""
         size = _LENGTH.unpack(self._receive(_LENGTH.size) or bytes(_LENGTH.size))[0]
@@ -48,10 +44,6 @@ class CameraSocket:
         """Whether the grabbed image is sound, and the image, BGR."""
         image = cv2.imdecode(np.frombuffer(self._encoded, dtype=np.uint8), cv2.IMREAD_COLOR)
         return image is not None, image
-
-    def get(self, prop: int) -> float:
-        """Nothing is known of the camera."""
-        return 0.0
 
     def set(self, prop: int, value: float) -> bool:
         """Nothing can be requested."""

@@ -151,8 +151,6 @@ class BoardFinder:
     """Detects any of the boards of `Board.printed` in an image."""
 
     def __init__(self) -> None:
-        firsts = range(0, UNSIZED_BOARD_ID + 1, MARKERS)
-        self._boards = {first: Board(NOMINAL_SQUARES[0], first) for first in firsts}
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         self._markers = cv2.aruco.ArucoDetector(dictionary(), parameters)
@@ -160,8 +158,8 @@ class BoardFinder:
         expected.checkMarkers = False  # OpenCV's check rejects boards at a slant; `_agreeing` does not
         expected.minMarkers = 1
         self._detectors = {
-            first: cv2.aruco.CharucoDetector(board.opencv, expected, parameters)
-            for first, board in self._boards.items()
+            first: cv2.aruco.CharucoDetector(Board(NOMINAL_SQUARES[0], first).opencv, expected, parameters)
+            for first in range(0, UNSIZED_BOARD_ID + 1, MARKERS)
         }
 
     def find(self, image: Image, name: str = "image") -> BoardView | None:

@@ -1,27 +1,32 @@
-"""Sources of frames: a topic, a file, or a V4L2 device. One protocol, so a camera node has one code path."""
+"""Sources of frames: a topic, a video, pictures, a recording, or a V4L2 device; a camera node has one code path."""
 
 from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Protocol
 
 import cv2
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.cameras.camera_socket import CameraSocket
-from paramove.cameras.frames import EndOfFrames, Frame, FrameError, image_of_raw
-from paramove.cameras.replayed_frames import FolderFrames, RecordingFrames
+from paramove.cameras.frames import EndOfFrames, Frame, FrameError, decode, image_of_raw
 from paramove.devices import holders
-from paramove.documents import Image, InputError, opened_video
+from paramove.documents import Image, InputError, opened_video, read_picture
+from paramove.recording import Recorded, read
 
 _log = logging.getLogger(__name__)
 
 SOURCES = "topic:camera/image_raw, file:PATH, device:PATH, folder:PATH@RATE or recording:PATH#TOPIC"
 TIMEOUT_NS = 1_000_000_000
 """A source without frames for longer has a fault."""
+PICTURES = (".jpg", ".jpeg", ".png", ".bmp")
+TICK_FRACTION = 0.25
+"""Fraction of a frame's period by which it may be early, as ticks are rounded to milliseconds."""
 
 
 class SourceError(FrameError, InputError):
@@ -35,27 +40,27 @@ class SourceError(FrameError, InputError):
 class Capture(Protocol):
     """The part of cv2.VideoCapture that is used."""
 
-    def isOpened(self) -> bool: ...  # noqa: N802
     def grab(self) -> bool: ...
     def retrieve(self) -> tuple[bool, Any]: ...
-    def get(self, prop: int) -> float: ...
     def set(self, prop: int, value: float) -> bool: ...
     def release(self) -> None: ...
 
 
-class FrameSource(Protocol):
+class FrameSource(ABC):
     """Gives a frame on request, once a tick, or (a topic) once a message."""
 
-    from_topic: bool
+    from_topic = False
     """True if frames come as messages, False if they are read at each tick."""
 
+    @abstractmethod
     def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
         """The latest frame, None if there is no new one yet. Raises FrameError."""
 
-    def close(self) -> None: ...
+    def close(self) -> None:  # noqa: B027 - most sources hold nothing
+        """Releases what the source holds."""
 
 
-class TopicFrames:
+class TopicFrames(FrameSource):
     """Frames that another node publishes as raw images, such as the simulator's camera."""
 
     from_topic = True
@@ -77,36 +82,39 @@ class TopicFrames:
         self._index += 1
         return Frame(image_of_raw(raw), now_ns, self._index - 1)
 
-    def close(self) -> None:
-        """Does nothing: there is no resource to release."""
+
+class PlayedFrames(FrameSource):
+    """Frames that are played at their own rate, from the first request on; those between two ticks are left out."""
+
+    _start_ns: int | None = None
+
+    def _elapsed_ns(self, now_ns: int) -> int:
+        """Time since the first request."""
+        self._start_ns = now_ns if self._start_ns is None else self._start_ns
+        return now_ns - self._start_ns
 
 
-class FileFrames:
-    """Frames of a video file, at the file's own rate; frames between two ticks are left out.
+class FileFrames(PlayedFrames):
+    """Frames of a video file.
 
     Raises SourceError if the file does not exist or is no video; EndOfFrames after the last frame.
     """
 
-    from_topic = False
-
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._capture: Capture = opened_video(path, SourceError)
-        self._rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
-        self._count = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
-        readable = self._capture.grab()
-        self._capture.release()
+        capture = opened_video(path, SourceError)
+        self._rate_hz = capture.get(cv2.CAP_PROP_FPS)
+        self._count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        readable = capture.grab()
+        capture.release()
         if not readable:
             raise SourceError(f"{path} ({path.stat().st_size} bytes) holds no frame: it is cut off or damaged")
-        self._capture = opened_video(path, SourceError)  # from the first frame on
-        self._start_ns: int | None = None
+        self._capture: Capture = opened_video(path, SourceError)  # from the first frame on
         self._grabbed = 0
 
     def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
         """The frame of the video that is due. Raises EndOfFrames after the last one, FrameError."""
-        self._start_ns = now_ns if self._start_ns is None else self._start_ns
-        # A quarter of a frame of tolerance, as ticks are rounded to milliseconds.
-        due = int((now_ns - self._start_ns) * 1e-9 * self._rate_hz + 0.25) + 1
+        due = int(self._elapsed_ns(now_ns) * 1e-9 * self._rate_hz + TICK_FRACTION) + 1
         if self._grabbed >= due:
             return None
         while self._grabbed < due:
@@ -127,7 +135,78 @@ class FileFrames:
         return EndOfFrames(f"{self._path} has ended after {self._grabbed} frames{early}")
 
 
-class DeviceFrames:
+class FolderFrames(PlayedFrames):
+    """The pictures of a folder in the order of their names, at a given rate.
+
+    Raises InputError if there are none; EndOfFrames after the last one.
+    """
+
+    def __init__(self, folder: Path, rate_hz: float) -> None:
+        self._files = sorted(file for file in folder.glob("*") if file.suffix.lower() in PICTURES)
+        if not self._files:
+            reason = "it holds none" if folder.is_dir() else "there is no such folder"
+            raise InputError(f"{folder}: a folder of pictures ({', '.join(PICTURES)}) expected, {reason}", missing=True)
+        if not 0.1 <= rate_hz <= 1000.0:
+            raise InputError(f"{folder}: 0.1 to 1000 pictures per second expected, found {rate_hz}")
+        self._folder, self._rate_hz = folder, rate_hz
+        self._next = 0
+
+    def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
+        """The latest picture that is due. Raises FrameError for one that cannot be read."""
+        index = int(self._elapsed_ns(now_ns) * 1e-9 * self._rate_hz + TICK_FRACTION)
+        if index < self._next:
+            return None
+        if index >= len(self._files):
+            raise EndOfFrames(f"{self._folder} has ended after {len(self._files)} pictures")
+        self._next = index + 1
+        try:
+            image = read_picture(self._files[index])
+        except InputError as error:
+            raise FrameError(str(error), "corrupt") from error
+        return Frame(image, now_ns, index)
+
+
+class RecordingFrames(PlayedFrames):
+    """The images of one topic of a recording, at the times at which they were captured.
+
+    Raises InputError if the recording has none; EndOfFrames after the last one.
+    """
+
+    def __init__(self, path: Path, topic: str) -> None:
+        if not path.is_file():
+            raise InputError(f"{path}: no such recording; a run's recording.mcap expected", missing=True)
+        self._path, self._topic = path, topic
+        self._recorded: Iterator[Recorded] = read(path, only=[topic])
+        try:
+            self._waiting = next(self._recorded, None)
+        except KeyError as error:
+            raise InputError(f"{path}: {error.args[0]}") from error
+        if self._waiting is None or not isinstance(self._waiting.message, CompressedImage):
+            raise InputError(f"{path}: no images on {topic}; `paramove recover` lists the contents of a recording")
+        self._first_ns = self._captured_ns(self._waiting)
+        self._index = 0
+
+    def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
+        """The latest image that is due. Raises FrameError for one that cannot be decoded."""
+        due_ns = self._first_ns + self._elapsed_ns(now_ns) + 1_000_000
+        if self._waiting is None:
+            raise EndOfFrames(f"{self._path} has ended after {self._index} images on {self._topic}")
+        latest: Recorded | None = None
+        while self._waiting is not None and self._captured_ns(self._waiting) <= due_ns:
+            latest, self._waiting = self._waiting, next(self._recorded, None)
+            self._index += 1
+        return None if latest is None else Frame(decode(latest.message), now_ns, self._index - 1)
+
+    def close(self) -> None:
+        """Releases the file."""
+        self._recorded = iter(())
+
+    @staticmethod
+    def _captured_ns(recorded: Recorded) -> int:
+        return int(recorded.message.timestamp.ToNanoseconds())
+
+
+class DeviceFrames(FrameSource):
     """Frames of a V4L2 device or a program's socket, read by a thread that stores only the latest: no frame is late.
 
     A device that was unplugged may block a read for ten seconds or hand out its last frame again (opencv #5221,
@@ -139,8 +218,6 @@ class DeviceFrames:
         width_px, height_px, rate_hz: requested from the device.
         open_capture: opens a path; tests give a fake device.
     """
-
-    from_topic = False
 
     def __init__(
         self,
@@ -172,7 +249,9 @@ class DeviceFrames:
             no_data_ns = now_ns - self._latest_ns
             if no_data_ns < self._timeout_ns:
                 return None
-            self._reopen(now_ns)
+            self._reader.stop()
+            self._latest_ns = now_ns
+            self._reader = _Reader(self._open())
             raise FrameError(
                 f"camera {self._path} has given no frame for {no_data_ns / 1e9:.1f} s: replug it", "silent"
             )
@@ -189,11 +268,6 @@ class DeviceFrames:
         for prop, value in self._settings.items():
             capture.set(prop, value)
         return capture
-
-    def _reopen(self, now_ns: int) -> None:
-        self._reader.stop()
-        self._latest_ns = now_ns
-        self._reader = _Reader(self._open())
 
 
 class _Reader:
@@ -281,7 +355,7 @@ def _open_v4l2(path: str) -> Capture:
         if device.is_socket():
             return _offered(device)
         raise SourceError(f"{path} cannot be opened: {error.strerror}; a V4L2 camera expected") from error
-    capture: Capture = cv2.VideoCapture(path, cv2.CAP_V4L2)
+    capture = cv2.VideoCapture(path, cv2.CAP_V4L2)
     if not capture.isOpened():
         capture.release()
         held = ", ".join(map(str, holders(device)))
