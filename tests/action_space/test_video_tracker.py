@@ -110,7 +110,7 @@ def test_the_same_images_give_the_same_estimates(parameters):
 
 def test_files_of_the_run_come_before_those_of_the_workspace(folder, tmp_path):
     setup = TrackingSetup.model_validate({"cameras": "cameras.yaml", "actions": (str(folder / "pointing.npz"),)})
-    assert setup.video_tracker(folder).cameras == ("camera_1", "camera_2")
+    assert list(setup.video_tracker(folder).cameras) == ["camera_1", "camera_2"]
     with pytest.raises(InputError, match=r"there is no calibration file .*; `paramove calibrate cameras` writes one"):
         setup.video_tracker(tmp_path)
 

@@ -6,7 +6,15 @@ import cv2
 import numpy as np
 import pytest
 
-from paramove.cameras.charuco_board import MARKER_FRACTION, MARKERS, Board, BoardError, BoardFinder, dictionary
+from paramove.cameras.charuco_board import (
+    MARKER_FRACTION,
+    MARKERS,
+    Board,
+    BoardError,
+    BoardFinder,
+    dictionary,
+    nominal_square,
+)
 from paramove.cameras.charuco_sheet import PAPERS, board_sheet, marker_sheet
 from paramove.observation.markers import DEFAULT_MARKERS
 from tests.cameras.board_scene import Sheet, blank, camera, looking, raster, rectangles_mm
@@ -122,9 +130,9 @@ def test_partly_hidden_boards_are_found_and_others_are_not():
 
 
 def test_ids_tell_the_printed_size():
-    assert Board.printed(0.03).nominal_square == 0.03
-    assert Board.printed(0.045).nominal_square == 0.045
-    assert Board.printed(0.036).nominal_square is None
+    assert nominal_square(Board.printed(0.03).first_id) == 0.03
+    assert nominal_square(Board.printed(0.045).first_id) == 0.045
+    assert nominal_square(Board.printed(0.036).first_id) is None
     assert (
         len(set(Board.printed(0.03).ids) | set(Board.printed(0.045).ids) | set(Board.printed(0.036).ids)) == 3 * MARKERS
     )

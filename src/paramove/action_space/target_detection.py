@@ -183,24 +183,19 @@ class TargetDetector:
     def _take(self, arrived_s: float, action: str, theta: ThetaEstimate, position: Floats) -> None:
         """Means over the frames of one rest, weighted by their certainty."""
         weight = 1.0 / max(theta.deviation, 1e-3) ** 2
-        again = self.latest is not None and self._same(position)
-        number = 1 if self.latest is None else self.latest.number + (0 if again else 1)
-        if self.latest is not None and again:
-            arrived_s = self.latest.time_s
-        mean, covariance, deviation = theta.mean, theta.covariance, theta.deviation
-        if self._weight > 0.0 and self.latest is not None:
-            number = self.latest.number
-            if self.latest.action == action:
+        number, mean, covariance, deviation = 1, theta.mean, theta.covariance, theta.deviation
+        if (latest := self.latest) is not None:
+            # The same target again, which the hand left only a little.
+            again = self._distance_m < self.options.returned_m and (
+                float(np.linalg.norm(position - latest.place)) < self.options.min_travel_m
+            )
+            arrived_s = latest.time_s if again else arrived_s
+            number = latest.number if again or self._weight > 0.0 else latest.number + 1
+            if self._weight > 0.0 and latest.action == action:
                 gain = weight / (self._weight + weight)
-                mean = self.latest.theta + gain * (mean - self.latest.theta)
-                covariance = self.latest.covariance + gain * (covariance - self.latest.covariance)
-                position = self.latest.place + gain * (position - self.latest.place)
-                deviation = self.latest.deviation + gain * (deviation - self.latest.deviation)
+                mean = latest.theta + gain * (mean - latest.theta)
+                covariance = latest.covariance + gain * (covariance - latest.covariance)
+                position = latest.place + gain * (position - latest.place)
+                deviation = latest.deviation + gain * (deviation - latest.deviation)
         self._weight += weight
         self.latest = DetectedTarget(number, arrived_s, action, mean, covariance, position, deviation)
-
-    def _same(self, position: Floats) -> bool:
-        """Whether the position at which the hand just arrived is the latest target, which it left only a little."""
-        if self.latest is None or self._distance_m >= self.options.returned_m:
-            return False
-        return float(np.linalg.norm(position - self.latest.place)) < self.options.min_travel_m

@@ -80,6 +80,9 @@ class VideoTracker:
         observer: Compares postures with images; its cameras are `cameras`.
         cameras: As calibrated, in the order of the observer.
         period_s: Time between two images of a camera, s.
+
+    Attributes:
+        cameras: By their names.
     """
 
     def __init__(
@@ -88,9 +91,9 @@ class VideoTracker:
         self._tracker = tracker
         self._observer = observer
         self._key_points = KeyPointObserver(observer.sizes, cameras)
-        self._cameras = {camera.name: camera for camera in cameras}
-        self._awaited = AwaitedKeyPoints(list(self._cameras))
-        self._views = AlignedViews[Timed](list(self._cameras), period_s)
+        self.cameras = {camera.name: camera for camera in cameras}
+        self._awaited = AwaitedKeyPoints(list(self.cameras))
+        self._views = AlignedViews[Timed](list(self.cameras), period_s)
         self._started_ns: int | None = None
         self._watch = CameraWatch(cameras, period_s)
         self._dark: list[str] = []
@@ -100,14 +103,9 @@ class VideoTracker:
         """Compiles everything in advance, so that the first image does not wait for the compiler."""
         tracked = self._tracker.filter
         moved = tracked.propagation.predicted(tracked.particles, 0.1, np.random.default_rng(0))
-        first = next(iter(self._cameras.values()))
+        first = next(iter(self.cameras.values()))
         trial = ArmObserver(self._observer.sizes, [first], self._observer.options, table=self._observer.table)
         compile_observer(trial, first, self._tracker.placement.in_world(moved.poses))
-
-    @property
-    def cameras(self) -> tuple[str, ...]:
-        """Names of the cameras."""
-        return tuple(self._cameras)
 
     @property
     def parameter_names(self) -> dict[str, tuple[str, ...]]:
@@ -168,7 +166,7 @@ class VideoTracker:
         estimate = self._tracker.update(time_s, self._log_likelihoods, self._presence)
         estimate = replace(estimate, pose=self._key_points.corrected(estimate.pose, estimate.covariance))
         self._uncertainty = estimate.detail
-        first = next(iter(self._cameras.values()))
+        first = next(iter(self.cameras.values()))
         theta, target = estimate.theta[estimate.action], estimate.target
         pointed = estimate.targets[estimate.action]
         yield TrackedState(
@@ -201,7 +199,7 @@ class VideoTracker:
         if not dark.any():
             return []
         self._observer.look([None if bad else image for bad, image in zip(dark, images, strict=True)])
-        names = [name for bad, name in zip(dark, self._cameras, strict=True) if bad]
+        names = [name for bad, name in zip(dark, self.cameras, strict=True) if bad]
         return [f"{name} is dark: take off the lens cap or switch on the light" for name in names]
 
     def _deviation(self, action: str, theta: Floats, covariance: Floats) -> Floats:

@@ -96,6 +96,10 @@ class CalibratedCamera:
         pixels: Floats = normalised @ self.matrix[:2, :2].T + self.matrix[:2, 2]
         return self.distort(pixels) if distorted else pixels
 
+    def depths(self, points: Floats) -> Floats:
+        """How far before the camera points of the world, (..., 3), m, are along its axis, (...), m."""
+        return np.asarray(points @ self.camera_from_world[2, :3] + self.camera_from_world[2, 3])
+
     def distort(self, pixels: ArrayLike) -> Floats:
         """Pixels of the undistorted image -> of the image as captured. Shape (..., 2), px."""
         ideal = np.asarray(pixels, dtype=np.float64)

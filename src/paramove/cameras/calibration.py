@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.cameras.charuco_board import Board, BoardView
+from paramove.cameras.charuco_board import Board, BoardView, nominal_square
 from paramove.documents import Floats, InputError
 
 MIN_VIEWS = 6
@@ -95,7 +95,7 @@ def check_square(board: Board, views: Sequence[BoardView]) -> list[str]:
     if len(firsts) > 1:
         boards = " and ".join(f"that of {_size_of(first)} in {view.name}" for first, view in sorted(firsts.items()))
         raise CalibrationError(f"the images show different boards: {boards}; use one board in all images")
-    nominal = Board(board.square, next(iter(firsts))).nominal_square if firsts else None
+    nominal = nominal_square(views[0].first_id) if views else None
     if nominal is None or abs(board.square / nominal - 1.0) <= SCALE_TOLERANCE:
         return []
     given, printed = f"{board.square * 1000:.4g} mm", f"{nominal * 1000:.4g} mm"
@@ -109,7 +109,7 @@ def check_square(board: Board, views: Sequence[BoardView]) -> list[str]:
 
 
 def _size_of(first_id: int) -> str:
-    nominal = Board(0.03, first_id).nominal_square
+    nominal = nominal_square(first_id)
     return "unusual squares" if nominal is None else f"squares of {nominal * 1000:g} mm"
 
 

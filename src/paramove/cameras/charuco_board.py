@@ -83,12 +83,6 @@ class Board:
         return cls(square, MARKERS * (standard[0] if standard else len(NOMINAL_SQUARES)))
 
     @property
-    def nominal_square(self) -> float | None:
-        """Side for which boards with these ids are printed, m; None if the ids do not encode it."""
-        index = self.first_id // MARKERS
-        return NOMINAL_SQUARES[index] if index < len(NOMINAL_SQUARES) else None
-
-    @property
     def ids(self) -> NDArray[np.int32]:
         """Ids of the markers, row by row from the upper left, [20]."""
         return np.arange(self.first_id, self.first_id + MARKERS, dtype=np.int32)
@@ -109,6 +103,12 @@ class Board:
         forward = (ROWS + 1) * self.square - down
         left = 0.5 * COLUMNS * self.square - right
         return np.stack([forward, left, self.thickness - into], axis=-1)
+
+
+def nominal_square(first_id: int) -> float | None:
+    """Side for which boards with these ids of markers are printed, m; None if the ids do not encode it."""
+    index = first_id // MARKERS
+    return NOMINAL_SQUARES[index] if index < len(NOMINAL_SQUARES) else None
 
 
 def dictionary() -> Any:

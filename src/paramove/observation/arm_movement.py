@@ -156,7 +156,7 @@ def _depth_errors(
 
     The most probable constant error, which is as large as those of single images.
     """
-    ahead = (points @ camera.camera_from_world[2, :3]) + camera.camera_from_world[2, 3]
+    ahead = camera.depths(points)
     behind = ahead - ahead[:, :1]
     off = [
         one.depths_at(at[SHOULDER], camera.matrix[0, 0])[side] - found

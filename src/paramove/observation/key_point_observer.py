@@ -143,7 +143,7 @@ class KeyPointObserver:
         towards = np.zeros(len(before))
         for camera, points in detected:
             slopes, projected = self._slopes(before, camera)
-            ahead = arm[0] @ camera.camera_from_world[2, :3] + camera.camera_from_world[2, 3]
+            ahead = camera.depths(arm[0])
             unsure_px = np.sqrt(0.5 * np.einsum("pid,de,pie->p", slopes, unsure, slopes))
             off = np.hypot(self.options.across, unsure_px * ahead / camera.matrix[0, 0])
             own, total = self.densities(arm, camera, points, off)
@@ -184,7 +184,7 @@ class KeyPointObserver:
 
         An unknown point is no point of the arm. `model`: by how much the arm is off, of each point or all, m.
         """
-        ahead = arm @ camera.camera_from_world[2, :3] + camera.camera_from_world[2, 3]
+        ahead = camera.depths(arm)
         deviations, positions = points.deviations[:, None], points.positions[:, None]
         with np.errstate(invalid="ignore", divide="ignore"):
             widened = 1.0 + (self._model_px(ahead, camera, model) / deviations) ** 2

@@ -194,9 +194,8 @@ def _aside(camera: CalibratedCamera, target: Floats, arms: Sequence[Floats]) -> 
     tips = tips[np.isfinite(tips).all(axis=1)]
     if not len(tips):
         return 0.0
-    ahead = float(camera.camera_from_world[2, :3] @ target + camera.camera_from_world[2, 3])
     off = np.median(tips, axis=0) - camera.project(target)
-    return float(np.linalg.norm(off) * ahead / camera.matrix[0, 0])
+    return float(np.linalg.norm(off) * float(camera.depths(target)) / camera.matrix[0, 0])
 
 
 def body_points(movement: ArmMovement) -> Floats:
