@@ -44,7 +44,7 @@ def run(bus: Bus, config: Config) -> None:
                 else:
                     states = tracker.see(camera, event.captured_ns, decode(event.message))
             except FrameError as error:
-                tracker.add_unreadable(camera, event.captured_ns, str(error))
+                tracker.watch.reject(camera, event.captured_ns, str(error))
         for state in states:
             for topic, message in zip(PUBLISHES, messages_of(state, names, config.particles, place), strict=True):
                 bus.publish(topic, message, state.captured_ns)

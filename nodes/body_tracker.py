@@ -30,14 +30,14 @@ def run(bus: Bus, config: Config) -> None:
     reported = ""
     for event in bus.events(*SUBSCRIBES, tick=True):
         if isinstance(event, Tick):
-            tracking.tick(event.now_ns)
+            tracking.watch.tick(event.now_ns)
         elif (camera := event.topic.name.removesuffix("/image")) in tracking.cameras:
             try:
                 for pose in tracking.see(camera, event.captured_ns, decode(event.message)):
                     for topic, message in zip(PUBLISHES, body_messages(pose, first), strict=True):
                         bus.publish(topic, message, pose.captured_ns)
             except FrameError as error:
-                tracking.add_unreadable(camera, event.captured_ns, str(error))
+                tracking.watch.reject(camera, event.captured_ns, str(error))
         if (trouble := tracking.trouble()) != reported:
             reported = trouble
             bus.degraded(trouble) if trouble else bus.ready(detail)

@@ -90,5 +90,5 @@ def test_a_wrong_camera_is_refused():
         CalibratedCamera("a", 640, 480, camera.matrix, LENS, np.diag([1.0, 1.0, 2.0, 1.0]))
     with pytest.raises(InputError, match="distortion of shape"):
         CalibratedCamera("a", 640, 480, camera.matrix, np.zeros(3), camera.camera_from_world)
-    with pytest.raises(InputError, match="640 x 480 px expected"):
+    with pytest.raises(InputError, match="gives 320 x 240 px, calibrated are 640 x 480 px"):
         camera.undistort(np.zeros((240, 320, 3), np.uint8))

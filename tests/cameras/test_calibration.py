@@ -183,7 +183,7 @@ def test_a_board_that_was_moved_on_the_table(seen, placed):
 def test_a_board_too_small_to_tell_its_tilt():
     """From afar both poses of a plane fit; the one that is taken must not be a guess."""
     eye = camera(pose=looking((3.2, 0.6, 3.2), (0.15, 0.0, 0.0)), k1=0.0, k2=0.0)
-    lens = Lens("far", (640, 480), eye.matrix, eye.distortion, 0.1, 0.5, 0.5, 30.0, 1.0, (), ())
+    lens = Lens("far", (640, 480), eye.matrix, eye.distortion, 0.1, np.zeros(0), 0.5, 0.5, 30.0, 1.0, ())
     board = Board(0.01, 40)
     view = BoardFinder().find(SHEET.seen_by(made("left")))
     which = view.corner_ids

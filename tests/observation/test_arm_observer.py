@@ -138,9 +138,9 @@ def test_wrong_images_are_refused_and_leave_no_image(pictures):
     observer.look(pictures[:2])
     for images, message in (
         (pictures[:1], "expected 2 images.*found 1"),
-        ([pictures[0][:100], None], r"\(240, 320, 3\) and type uint8"),
-        ([pictures[0].astype(float), None], "expected an image of shape .* uint8"),
-        ([pictures[0][..., 0], None], "expected an image of shape .* uint8"),
+        ([pictures[0][:100], None], "gives 320 x 100 px, calibrated are 320 x 240 px"),
+        ([pictures[0].astype(float), None], r"an image \(H, W, 3\) uint8 expected, found .* float64"),
+        ([pictures[0][..., 0], None], r"an image \(H, W, 3\) uint8 expected, found \(240, 320\) uint8"),
     ):
         with pytest.raises(InputError, match=message):
             observer.look(images)

@@ -131,7 +131,7 @@ def test_what_is_refused():
     image = with_markers(EYES[0])
     with pytest.raises(InputError, match="each of 2 cameras, found 1"):
         tracker.update([image])
-    with pytest.raises(InputError, match=r"camera 'right': .*\(480, 640, 3\).*\(240, 320, 3\)"):
+    with pytest.raises(InputError, match="right gives 320 x 240 px, calibrated are 640 x 480 px"):
         tracker.update([image, image[::2, ::2]])
     with pytest.raises(InputError, match="a number or colour of its own for each point"):
         StereoBodyTracker(EYES, BodyTrackerOptions(markers={"elbow": ArucoMarker(91), "wrist": ArucoMarker(91)}))

@@ -64,12 +64,10 @@ class Measurement:
     Attributes:
         best: largest log-likelihood of a particle, nats.
         temper: exponent by which the likelihood was flattened; 1 if it was not.
-        effective: effective number of particles afterwards.
     """
 
     best: float
     temper: float
-    effective: float
 
 
 class ParticleFilter:
@@ -101,7 +99,7 @@ class ParticleFilter:
             joint = np.log(particles.weights) + temper * flattened
         weights = np.exp(joint - log_sum(joint))
         self.particles = replace(particles, weights=weights / weights.sum())
-        return Measurement(float(log_likelihoods.max()), temper, effective_number(self.particles.weights))
+        return Measurement(float(log_likelihoods.max()), temper)
 
     def explore(self, fraction: float) -> None:
         """Moves about this fraction of the particles anywhere; their weights stay."""

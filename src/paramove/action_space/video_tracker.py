@@ -83,6 +83,7 @@ class VideoTracker:
 
     Attributes:
         cameras: By their names.
+        watch: Which of them give usable images; takes those that cannot be decoded.
     """
 
     def __init__(
@@ -95,7 +96,7 @@ class VideoTracker:
         self._awaited = AwaitedKeyPoints(list(self.cameras))
         self._views = AlignedViews[Timed](list(self.cameras), period_s)
         self._started_ns: int | None = None
-        self._watch = CameraWatch(cameras, period_s)
+        self.watch = CameraWatch(cameras, period_s)
         self._dark: list[str] = []
         self._uncertainty = ""
 
@@ -117,7 +118,7 @@ class VideoTracker:
 
         The background is learned when the next state is requested: an estimate does not wait for that.
         """
-        if self._watch.accepts(camera, captured_ns, image):
+        if self.watch.accepts(camera, captured_ns, image):
             for views in self._views.add(camera, captured_ns, (captured_ns, image)):
                 yield from self._all_tracked(self._awaited.add_set(views))
 
@@ -129,19 +130,15 @@ class VideoTracker:
         for views, points in released:
             yield from self._tracked(views, points)
 
-    def add_unreadable(self, camera: str, captured_ns: int, why: str) -> None:
-        """Reports an image that could not be decoded."""
-        self._watch.reject(camera, captured_ns, why)
-
     def tick(self, now_ns: int) -> Iterator[TrackedState]:
         """Advances the time, with images or without; the states of images that wait no longer for key points."""
-        self._watch.tick(now_ns)
+        self.watch.tick(now_ns)
         yield from self._all_tracked(self._awaited.released(now_ns))
 
     def trouble(self) -> str:
         """Why images are not used, and what is uncertain about the arm; "" if nothing is wrong."""
         return "; ".join(
-            part for part in (*self._watch.troubles(), self._awaited.trouble(), *self._dark, self._uncertainty) if part
+            part for part in (*self.watch.troubles(), self._awaited.trouble(), *self._dark, self._uncertainty) if part
         )
 
     @property
@@ -151,7 +148,7 @@ class VideoTracker:
         lost = estimate is not None and estimate.lost
         late = ("late",) if self._awaited.trouble() else ()
         return (
-            *self._watch.kinds(),
+            *self.watch.kinds(),
             *late,
             *self._dark,
             *(("lost" if lost else "unsure",) if self._uncertainty else ()),

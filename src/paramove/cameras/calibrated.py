@@ -123,22 +123,24 @@ class CalibratedCamera:
             result[known] = ideal.reshape(-1, 2)
         return result
 
-    def check_image(self, image: Image) -> None:
-        """Raises InputError unless an image is (H, W, 3) uint8 as calibrated."""
-        expected = (self.height_px, self.width_px, 3)
-        if image.shape != expected or image.dtype != np.uint8:
+    def check_size(self, image: Image) -> None:
+        """Raises InputError unless an image (H, W) or (H, W, C) has the calibrated size."""
+        height_px, width_px = image.shape[:2]
+        if (width_px, height_px) != (self.width_px, self.height_px):
             raise InputError(
-                f"camera {self.name!r}: expected an image of shape {expected} and type uint8, as calibrated; found "
-                f"{image.shape} and {image.dtype}"
+                f"{self.name} gives {width_px} x {height_px} px, calibrated are {self.width_px} x {self.height_px} px: "
+                "set its resolution or calibrate it again"
             )
+
+    def check_image(self, image: Image) -> None:
+        """Raises InputError unless an image is (H, W, 3) uint8 and has the calibrated size."""
+        if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
+            raise InputError(f"{self.name}: an image (H, W, 3) uint8 expected, found {image.shape} {image.dtype}")
+        self.check_size(image)
 
     def undistort(self, image: Image) -> Image:
         """The image (H, W) or (H, W, C) with the lens distortion removed; the camera matrix is the same."""
-        if image.shape[:2] != (self.height_px, self.width_px):
-            raise InputError(
-                f"camera {self.name!r}: an image of {image.shape[1]} x {image.shape[0]} px found, "
-                f"{self.width_px} x {self.height_px} px expected as calibrated"
-            )
+        self.check_size(image)
         if not len(self.distortion):
             return image
         return cast(Image, cv2.remap(image, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))

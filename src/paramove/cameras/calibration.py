@@ -7,7 +7,7 @@ which the board lies on the table. Image points: the middle of the first pixel i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -46,7 +46,7 @@ class Lens:
         name: Of the camera.
         size: Width and height of the image, px.
         matrix: [3, 3], px. distortion: [5] in OpenCV's order k1 k2 p1 p2 k3.
-        error_px: Root mean square reprojection error of the corners.
+        error_px: Root mean square reprojection error of the corners. view_errors_px: The same of each used view.
         focal_sd_px, centre_sd_px: Standard deviations of the focal length and of the image's centre.
         tilt_deg: Root mean square angle of the boards to their mean direction.
         covered: Fraction of the image, in cells of a 4 x 4 grid, in which corners were detected.
@@ -58,12 +58,13 @@ class Lens:
     matrix: Floats
     distortion: Floats
     error_px: float
+    view_errors_px: Floats
     focal_sd_px: float
     centre_sd_px: float
     tilt_deg: float
     covered: float
     used: tuple[str, ...]
-    left_out: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
 
     def advice(self) -> list[str]:
         """Advice for a better calibration; empty if it is good."""
@@ -126,27 +127,13 @@ def calibrate_lens(name: str, views: Sequence[BoardView], board: Board) -> Lens:
             f"than {MIN_TILT_DEG:g} needed), so focal length and distance cannot be separated: tilt the board by 30 "
             "to 45 deg to all sides"
         )
-    fitted = _fit(views, board)
-    inliers = _agreeing(fitted.view_errors_px)
+    lens = _fit(name, views, board)
+    inliers = _agreeing(lens.view_errors_px)
     left_out = tuple(view.name for view, used in zip(views, inliers, strict=True) if not used)
     if left_out:
-        views = [view for view, used in zip(views, inliers, strict=True) if used]
-        fitted = _fit(views, board)
-    focal = 0.5 * float(fitted.matrix[0, 0] + fitted.matrix[1, 1])
-    _check_lens(name, fitted, focal, views[0].size)
-    return Lens(
-        name=name,
-        size=views[0].size,
-        matrix=fitted.matrix,
-        distortion=fitted.distortion,
-        error_px=fitted.error_px,
-        focal_sd_px=fitted.focal_sd_px,
-        centre_sd_px=fitted.centre_sd_px,
-        tilt_deg=tilt,
-        covered=_covered(views),
-        used=tuple(view.name for view in views),
-        left_out=left_out,
-    )
+        lens = _fit(name, [view for view, used in zip(views, inliers, strict=True) if used], board)
+    _check_lens(lens)
+    return replace(lens, tilt_deg=tilt, left_out=left_out)
 
 
 def _check_views(name: str, views: Sequence[BoardView]) -> None:
@@ -181,24 +168,14 @@ def _tilt_deg(views: Sequence[BoardView], board: Board) -> float:
     return float(np.rad2deg(np.sqrt(np.mean(np.arccos(cosines) ** 2))))
 
 
-@dataclass(frozen=True)
-class _Fit:
-    matrix: Floats
-    distortion: Floats
-    error_px: float
-    view_errors_px: Floats
-    focal_sd_px: float
-    centre_sd_px: float
-
-
-def _fit(views: Sequence[BoardView], board: Board) -> _Fit:
+def _fit(name: str, views: Sequence[BoardView], board: Board) -> Lens:
     """Fits two radial coefficients, or three where the third lowers the error clearly."""
-    plain, bent = (_fitted(views, board, flags) for flags in (cv2.CALIB_FIX_K3, 0))
+    plain, bent = (_fitted(name, views, board, flags) for flags in (cv2.CALIB_FIX_K3, 0))
     surely_better = bent.error_px < RADIAL_GAIN * plain.error_px and plain.error_px > 0.3 * GOOD_ERROR_PX
     return bent if surely_better else plain
 
 
-def _fitted(views: Sequence[BoardView], board: Board, flags: int) -> _Fit:
+def _fitted(name: str, views: Sequence[BoardView], board: Board, flags: int) -> Lens:
     corners = board.corners() - [0.0, 0.0, board.thickness]  # Zhang's method needs the plane z = 0
     on_board = [corners[view.corner_ids].astype(np.float32) for view in views]
     in_image = [view.points.astype(np.float32) for view in views]
@@ -206,13 +183,18 @@ def _fitted(views: Sequence[BoardView], board: Board, flags: int) -> _Fit:
     error, matrix, distortion, _, _, deviations, _, per_view = cv2.calibrateCameraExtended(
         on_board, in_image, views[0].size, start, start, flags=flags
     )
-    return _Fit(
-        np.asarray(matrix, dtype=np.float64),
-        np.asarray(distortion, dtype=np.float64).ravel()[:5],
-        float(error),
-        np.asarray(per_view, dtype=np.float64).ravel(),
-        float(np.max(deviations.ravel()[:2])),
-        float(np.max(deviations.ravel()[2:4])),
+    return Lens(
+        name=name,
+        size=views[0].size,
+        matrix=np.asarray(matrix, dtype=np.float64),
+        distortion=np.asarray(distortion, dtype=np.float64).ravel()[:5],
+        error_px=float(error),
+        view_errors_px=np.asarray(per_view, dtype=np.float64).ravel(),
+        focal_sd_px=float(np.max(deviations.ravel()[:2])),
+        centre_sd_px=float(np.max(deviations.ravel()[2:4])),
+        tilt_deg=_tilt_deg(views, board),
+        covered=_covered(views),
+        used=tuple(view.name for view in views),
     )
 
 
@@ -223,16 +205,17 @@ def _agreeing(errors_px: Floats) -> NDArray[np.bool_]:
     return np.ones(len(bad), dtype=np.bool_) if too_many else ~bad
 
 
-def _check_lens(name: str, fitted: _Fit, focal: float, size: tuple[int, int]) -> None:
-    centre_x, centre_y = float(fitted.matrix[0, 2]), float(fitted.matrix[1, 2])
+def _check_lens(lens: Lens) -> None:
+    size, focal = lens.size, 0.5 * float(lens.matrix[0, 0] + lens.matrix[1, 1])
+    centre_x, centre_y = float(lens.matrix[0, 2]), float(lens.matrix[1, 2])
     inside = 0.0 < centre_x < size[0] and 0.0 < centre_y < size[1]
     plausible = 0.2 * max(size) < focal < 10.0 * max(size)
-    if fitted.focal_sd_px <= MAX_FOCAL_SD * focal and inside and plausible:
+    if lens.focal_sd_px <= MAX_FOCAL_SD * focal and inside and plausible:
         return
     raise CalibrationError(
-        f"{name}: the views do not determine the lens (focal length {focal:.0f} ± {fitted.focal_sd_px:.0f} px, ± "
+        f"{lens.name}: the views do not determine the lens (focal length {focal:.0f} ± {lens.focal_sd_px:.0f} px, ± "
         f"{MAX_FOCAL_SD:.1%} needed; centre {centre_x:.0f}, {centre_y:.0f} of {size[0]} x {size[1]} px; "
-        f"error {fitted.error_px:.2f} px): take more views, nearer, tilted by 30 to 45 deg to all sides"
+        f"error {lens.error_px:.2f} px): take more views, nearer, tilted by 30 to 45 deg to all sides"
     )
 
 

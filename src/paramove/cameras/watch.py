@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from paramove.cameras.calibrated import CalibratedCamera
-from paramove.documents import Image
+from paramove.documents import Image, InputError
 
 NO_DATA_S = 1.0
 """A camera without images for longer than this is reported."""
@@ -39,15 +39,13 @@ class CameraWatch:
     def accepts(self, camera: str, captured_ns: int, image: Image) -> bool:
         """Whether an image has the size that its camera was calibrated with."""
         self._received(camera, captured_ns)
-        calibrated, (height_px, width_px) = self._calibrated[camera], image.shape[:2]
-        if (width_px, height_px) == (calibrated.width_px, calibrated.height_px):
-            self._rejected.pop(camera, None)
-            return True
-        self._rejected[camera] = (
-            f"{camera} gives {width_px} x {height_px} px, calibrated are {calibrated.width_px} x "
-            f"{calibrated.height_px} px: set its resolution or calibrate it again"
-        )
-        return False
+        try:
+            self._calibrated[camera].check_size(image)
+        except InputError as error:
+            self._rejected[camera] = str(error)
+            return False
+        self._rejected.pop(camera, None)
+        return True
 
     def tick(self, now_ns: int) -> None:
         """Advances the time, with images or without."""

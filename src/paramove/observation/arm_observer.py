@@ -161,7 +161,10 @@ class ArmObserver:
         return flat.reshape(small.height_px + 2, small.width_px + 2)[1:-1, 1:-1].copy()
 
     def presence(self, pose: ArrayLike) -> Presence:
-        """Evidence that the images show an arm in this posture, (9,), m; call after `log_likelihoods`."""
+        """Evidence that the images show an arm in this posture, (9,), m; call after `log_likelihoods`.
+
+        Mean over the views; zeros without any.
+        """
         fitted = fitted_poses(np.reshape(pose, (1, -1)), self.sizes)[0]
         presences = [
             presence_in_view(
@@ -170,7 +173,10 @@ class ArmObserver:
             for view in self._views
             if view.background is not None and view.has_image and np.isfinite(fitted).all()
         ]
-        return Presence.mean(presences)
+        if not presences:
+            return Presence()
+        there, changed = [one.there for one in presences], [one.changed for one in presences]
+        return Presence(float(np.mean(there)), float(np.mean(changed)))
 
     def learn(self, pose: ArrayLike, elapsed_s: float) -> None:
         """Update the background from the images of the last `look`, around the arm in this posture, (9,), m.

@@ -36,7 +36,8 @@ class Background:
     """The background of one view at the size at which images are compared.
 
     Attributes:
-        change: see `changes`, flat with a border of one pixel; 0 everywhere before the background is known.
+        change: see `changes`, flat with a border of one pixel, (H + 2) (W + 2); 0 everywhere before the background is
+            known.
         weights: of the edges of each pixel, 0 to 1, (H, W).
         known_fraction: fraction of the pixels whose background is known.
     """
@@ -49,14 +50,10 @@ class Background:
         self._away = np.full(shape, KNOWN_AFTER_S, np.float32)  # the first image is known at once, except under the arm
         self._still = np.zeros(shape, np.uint8)
         self._change = np.zeros((height_px + 2, width_px + 2), np.int8)
+        self.change = self._change.reshape(-1)
         self._still_weight = still_weight
         self.known_fraction = 0.0
         self.weights = np.ones(shape, np.float32)
-
-    @property
-    def change(self) -> NDArray[np.int8]:
-        """Flat, (H + 2) (W + 2)."""
-        return self._change.reshape(-1)
 
     def see(self, image: Image) -> None:
         """Compare an image (H, W, 3)."""

@@ -47,6 +47,7 @@ class BodyTracking:
     Attributes:
         cameras: By their names.
         point_names: Of the marked points.
+        watch: Which cameras give usable images; takes the time, and images that cannot be decoded.
 
     Raises StereoError for fewer than two cameras, InputError for duplicate markers or none.
     """
@@ -56,7 +57,7 @@ class BodyTracking:
         self.cameras = {camera.name: camera for camera in cameras}
         self.point_names = tuple(options.markers)
         self._views = AlignedViews[Image](list(self.cameras), period_s)
-        self._watch = CameraWatch(cameras, period_s)
+        self.watch = CameraWatch(cameras, period_s)
         self._detected_ns: dict[str, int] = {}
         self._latest_ns = 0
 
@@ -65,21 +66,13 @@ class BodyTracking:
 
         An image of another size than calibrated is ignored and reported; a late one is ignored silently.
         """
-        if self._watch.accepts(camera, captured_ns, image):
+        if self.watch.accepts(camera, captured_ns, image):
             for views in self._views.add(camera, captured_ns, image):
                 yield self._located(views)
 
-    def add_unreadable(self, camera: str, captured_ns: int, why: str) -> None:
-        """Reports an image that could not be decoded."""
-        self._watch.reject(camera, captured_ns, why)
-
-    def tick(self, now_ns: int) -> None:
-        """Advances the time, with images or without."""
-        self._watch.tick(now_ns)
-
     def trouble(self) -> str:
         """Cameras without usable images and points that are not detected; "" if nothing is wrong."""
-        return "; ".join([*self._watch.troubles(), *self._undetected()])
+        return "; ".join([*self.watch.troubles(), *self._undetected()])
 
     def _located(self, views: Views[Image]) -> BodyPoints:
         points = self._tracker.located(views.images)

@@ -62,12 +62,7 @@ def images_of(
             for camera, frame in frames:
                 if frame is None:
                     continue
-                size = frame.image_bgr.shape[1::-1]
-                if size != (camera.width_px, camera.height_px):
-                    raise InputError(
-                        f"{camera.name} gives {size[0]} x {size[1]} px, expected are {camera.width_px} x "
-                        f"{camera.height_px} px"
-                    )
+                camera.check_size(frame.image_bgr)
                 yield camera, frame.captured_ns, frame.image_bgr
             if live:
                 time.sleep(PAUSE_S)

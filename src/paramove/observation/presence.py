@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,13 +32,6 @@ class Presence:
 
     there: float = 0.0
     changed: float = 0.0
-
-    @staticmethod
-    def mean(views: Sequence[Presence]) -> Presence:
-        """Mean over the views; zeros for none."""
-        if not views:
-            return Presence()
-        return Presence(float(np.mean([one.there for one in views])), float(np.mean([one.changed for one in views])))
 
 
 def presence_in_view(
