@@ -5,7 +5,7 @@ import pytest
 
 from paramove.action_space.grammar import Grammar
 from paramove.action_space.particle_filter import FilterOptions
-from paramove.action_space.placement import PersonPlacement
+from paramove.action_space.person import PersonPlacement
 from paramove.action_space.propagation import PropagationOptions
 from paramove.action_space.tracker import ActionTracker, TrackerOptions
 from paramove.action_space.vocabulary import Vocabulary

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from paramove.action_space.setup import Person, TrackingSetup, read_person
+from paramove.action_space.setup import TrackingSetup
 from paramove.action_space.video_tracker import VideoTracker
 from paramove.demonstrations import table_place
 from paramove.documents.input_error import InputError
@@ -113,30 +113,6 @@ def test_files_of_the_run_come_before_those_of_the_workspace(folder, tmp_path):
     assert list(setup.video_tracker(folder).cameras) == ["camera_1", "camera_2"]
     with pytest.raises(InputError, match=r"there is no calibration file .*; `paramove calibrate cameras` writes one"):
         setup.video_tracker(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("upper_arm: 28", "upper_arm: input should be less than 0.6, found 28; expected for example"),
-        ("upper_am: 0.28", "upper_am: extra inputs are not permitted, found 0.28"),
-        ("shoulder: [1, 2]", "shoulder.2 is missing"),
-        ("shoulder: [", "person.yaml:1:12"),
-    ],
-)
-def test_a_wrong_person_is_told_with_an_example(tmp_path, text, told):
-    (tmp_path / "person.yaml").write_text(text)
-    with pytest.raises(InputError, match="all in m") as caught:
-        read_person(tmp_path / "person.yaml")
-    assert told in str(caught.value)
-
-
-def test_a_person_s_measures_make_the_arm(tmp_path):
-    (tmp_path / "person.yaml").write_text("shoulder: [-0.3, -0.2, 0.4]\nupper_arm: 0.30\nforearm: 0.25\nhand: 0.18\n")
-    person = read_person(tmp_path / "person.yaml")
-    assert (person.sizes.upper_arm, person.sizes.lower_arm) == (0.30, 0.43)
-    assert person.placement.shoulder == (-0.3, -0.2, 0.4)
-    assert person.sizes.shoulder_radius > Person().sizes.shoulder_radius
 
 
 def test_an_action_that_is_not_there_is_told(parameters):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from paramove.action_space.placement import PersonPlacement
+from paramove.action_space.person import PersonPlacement
 from paramove.demonstrations import POINT_NAMES, table_place
 from paramove.documents.input_error import InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose

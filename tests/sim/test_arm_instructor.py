@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from paramove.action_space.setup import read_person
+from paramove.action_space.person import read_person
 from paramove.msgs.rule_pb2 import Speech
 from sim import looks, places, tool_box
 from sim.arm import ELBOW, SHOULDER, TIP, WRIST

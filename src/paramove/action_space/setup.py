@@ -2,85 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
+from pydantic import BaseModel, ConfigDict, Field
 
 from paramove.action_space.grammar import Grammar
 from paramove.action_space.grammar_file import read_grammar
 from paramove.action_space.messages import TablePose
 from paramove.action_space.particle_filter import FilterOptions
-from paramove.action_space.placement import PersonPlacement
+from paramove.action_space.person import measured_person
 from paramove.action_space.target_detection import DetectionOptions
 from paramove.action_space.track_health import HealthOptions
 from paramove.action_space.tracker import ActionTracker, TrackerOptions
 from paramove.action_space.training import table_action
 from paramove.action_space.video_tracker import VideoTracker
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
-from paramove.cameras import measured_cameras, measured_file
-from paramove.documents import InputError, findings, read_document, replacing
-from paramove.observation import ArmObserver, ArmSizes
+from paramove.cameras import measured_cameras
+from paramove.documents import InputError
+from paramove.observation import ArmObserver
 from paramove.phmm import ParametricHMM, PolynomialPHMM
 
 MIN_GROWN = 0.8
 """Minimum arm length of adults, relative to the demonstrator's."""
 SYNTHETIC = ("pointing", "reaching")
-
-
-class Person(BaseModel):
-    """A person's measures, m, as a file holds them.
-
-    Attributes:
-        shoulder: The resting right shoulder in the frame of the table.
-        upper_arm: Shoulder to elbow.
-        forearm: Elbow to wrist.
-        hand: Wrist to the tip of the index finger.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    shoulder: tuple[float, float, float] = PersonPlacement().shoulder
-    upper_arm: float = Field(default=ArmSizes.upper_arm, gt=0.07, lt=0.6)
-    forearm: float = Field(default=ArmSizes.forearm, gt=0.07, lt=0.5)
-    hand: float = Field(default=ArmSizes.hand, gt=0.04, lt=0.4)
-
-    @property
-    def sizes(self) -> ArmSizes:
-        """Of the arm; its thickness grows with its length."""
-        default = ArmSizes()
-        scaled = default.scaled((self.upper_arm + self.forearm + self.hand) / default.length)
-        return replace(scaled, upper_arm=self.upper_arm, forearm=self.forearm, hand=self.hand)
-
-    @property
-    def placement(self) -> PersonPlacement:
-        """Where the person sits, and how large the person is."""
-        return PersonPlacement.of_arm(self.shoulder, self.sizes.length)
-
-
-def read_person(path: Path) -> Person:
-    """The person of a YAML file. Raises InputError if it is missing or invalid."""
-    example = "shoulder: [-0.27, -0.18, 0.35], upper_arm: 0.28, forearm: 0.24, hand: 0.17, all in m"
-    try:
-        remedy = f"`paramove webcam person` writes it; it holds a person's measures, such as {example}"
-        return Person.model_validate(read_document(path, "file of a person", remedy=remedy).data)
-    except ValidationError as error:
-        raise InputError(f"{path}: {findings(error)}; expected for example {example}") from error
-
-
-def write_person(path: Path, person: Person, decimals: int = 3) -> None:
-    """Writes the file that `read_person` reads, rounded to so many decimals of a metre. Raises OSError."""
-    content: dict[str, object] = {"shoulder": [round(float(value), decimals) for value in person.shoulder]}
-    for name in ("upper_arm", "forearm", "hand"):
-        content[name] = round(float(getattr(person, name)), decimals)
-    with replacing(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
-        YAML().dump(content, file)
-
-
-def measured_person(run_folder: Path, path: Path | None) -> Person:
-    """The person of a file, looked for in the run's folder first; without one, the synthetic demonstrator."""
-    return Person() if path is None else read_person(measured_file(run_folder, path))
 
 
 class TrackingSetup(BaseModel):

@@ -21,7 +21,7 @@ from paramove.action_space.estimates import (
 )
 from paramove.action_space.grammar import Grammar
 from paramove.action_space.particle_filter import FilterOptions, Measurement, ParticleFilter, effective_number
-from paramove.action_space.placement import PersonPlacement
+from paramove.action_space.person import PersonPlacement
 from paramove.action_space.propagation import THESIS_RATE_HZ, Particles, Propagation, PropagationOptions, per_step
 from paramove.action_space.target_detection import DetectedTarget, DetectionOptions, TargetDetector
 from paramove.action_space.track_health import HealthOptions, TrackHealth

@@ -98,6 +98,7 @@ def marker_sheet(numbers: Mapping[str, int], side: float = 0.045, paper: str = "
 def _chequers(board: Board, sheet: Paper) -> list[str]:
     """Black squares and markers as one path, so that no hairlines appear between neighbours."""
     side = 1000.0 * board.square
+    gap = 0.5 * (1.0 - MARKER_FRACTION) * side
     left, upper = sheet.width_mm / 2 - COLUMNS / 2 * side, (ROWS + 1) * side
     path = []
     markers = iter(board.ids)
@@ -107,14 +108,8 @@ def _chequers(board: Board, sheet: Paper) -> list[str]:
             if (row + column) % 2 == 0:
                 path.append(_rectangle(x, y, side, side))
             else:
-                path += _marker(int(next(markers)), x, y, side)
+                path += _modules(int(next(markers)), x + gap, y + gap, MARKER_FRACTION * side / MODULES)
     return ["0 g", *path, "f"]
-
-
-def _marker(number: int, x: float, y: float, square_mm: float) -> list[str]:
-    """Black modules of a marker in the middle of a square with its lower left corner in (x, y)."""
-    gap = 0.5 * (1.0 - MARKER_FRACTION) * square_mm
-    return _modules(number, x + gap, y + gap, MARKER_FRACTION * square_mm / MODULES)
 
 
 def _modules(number: int, x: float, y: float, module: float) -> list[str]:

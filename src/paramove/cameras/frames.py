@@ -64,8 +64,10 @@ class FrameChecks:
 
     def passed(self, frame: Frame) -> Frame:
         """The same frame. Raises FrameError if it must not be used."""
-        check_shape(frame.image_bgr)
-        height, width = frame.image_bgr.shape[:2]
+        image = frame.image_bgr
+        if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
+            raise FrameError(f"array of shape {image.shape} and type {image.dtype} found, [H, W, 3] uint8 expected")
+        height, width = image.shape[:2]
         if (width, height) != self._size:
             raise FrameError(
                 f"frame {frame.index} has {width} x {height} px, {self._size[0]} x {self._size[1]} expected; "
@@ -100,12 +102,6 @@ class FrameChecks:
                 f"frame {frame.index} is saturated ({saturated:.0%} of the pixels are white): shorten the exposure",
                 "saturated",
             )
-
-
-def check_shape(image: Image) -> None:
-    """Raises FrameError unless the array is [H, W, 3] uint8."""
-    if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
-        raise FrameError(f"array of shape {image.shape} and type {image.dtype} found, [H, W, 3] uint8 expected")
 
 
 def image_of_raw(message: RawImage) -> Image:

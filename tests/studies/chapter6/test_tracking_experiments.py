@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from paramove.action_space.placement import PersonPlacement
+from paramove.action_space.person import PersonPlacement
 from paramove.cameras.calibrated import CalibratedCamera, write_cameras
 from paramove.demonstrations.synthetic import RESTING_SHOULDER
 from paramove.documents.input_error import InputError
