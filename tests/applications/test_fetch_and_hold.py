@@ -9,7 +9,7 @@ import pytest
 
 from paramove.motion.clear_plans import MIN_CLEARANCE, ClearPlans
 from paramove.motion.gripper_arm import GripperArm
-from paramove.motion.planned_motion import RestPose
+from paramove.motion.plans import RestPose
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.safety.trajectory_check import check_trajectory
 from tests.applications.launched import relocator

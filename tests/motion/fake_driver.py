@@ -14,7 +14,7 @@ from paramove.bus.subscriber import Received
 from paramove.bus.ticks import Tick
 from paramove.motion.clear_plans import ClearPlans
 from paramove.motion.gripper_arm import GripperArm
-from paramove.motion.planned_motion import PlannedMotion
+from paramove.motion.plans import PlannedMotion
 from paramove.motion.synthesizer import Synthesizer
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.motion.clear_plans import joined
-from paramove.motion.planned_motion import PlannedMotion
-from paramove.motion.plans import Grasp
+from paramove.motion.plans import Grasp, PlannedMotion
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.robots.description import RobotDescription
 from tests.motion.reaching import reaching_model

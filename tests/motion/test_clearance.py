@@ -9,12 +9,12 @@ import pytest
 from paramove.motion.clearance import (
     FAR_M,
     GRASPED_ABOVE_MIDDLE,
-    MAX_STANDING,
     ClearanceChecker,
     UprightCylinder,
     WorkSurface,
 )
 from paramove.motion.gripper_arm import GripperArm
+from paramove.motion.plans import MAX_STANDING
 from paramove.robots import RobotDescription
 from tests.motion.reaching import ARM, HOAP3, JOINTS, RIGHT, SURFACE, at, checker, planner, solver
 from tests.robots.servo_arms import ARMS, ArmModel
@@ -137,7 +137,7 @@ def test_where_nothing_stands_nothing_is_near() -> None:
 
 
 def test_more_objects_than_it_was_made_for_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"9 standing objects.* 8"):
+    with pytest.raises(ValueError, match=r"9 objects.* 8"):
         checker().smallest(over_the_surface(0.09), np.zeros((MAX_STANDING + 1, 2)), [False])
 
 

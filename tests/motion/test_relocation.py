@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from paramove.motion.arm_pose import UnreachablePoseError
-from paramove.motion.planned_motion import PlannedMotion
+from paramove.motion.plans import PlannedMotion
 from paramove.safety.trajectory_check import check_trajectory
 from sim.places import STRIP_X, STRIP_Y
 from tests.motion.reaching import ARM, CORNERS, GRASP_Z, HOAP3, JOINTS, OPENINGS, at, movement, planner, solver

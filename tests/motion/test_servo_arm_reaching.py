@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from paramove.motion.clearance import MAX_STANDING, ClearanceChecker, UprightCylinder, WorkSurface
-from paramove.motion.planned_motion import PlannedMotion, RestPose
-from paramove.motion.plans import Grasp, NoPlanError
+from paramove.motion.clearance import ClearanceChecker, UprightCylinder, WorkSurface
+from paramove.motion.plans import MAX_STANDING, Grasp, NoPlanError, PlannedMotion, RestPose
 from paramove.motion.servo_arm_reaching import FINGER_GAP_M, ServoArmReaching
 from paramove.robots.description import DescriptionError, RobotDescription
 from paramove.robots.planar_arm import OutOfReachError

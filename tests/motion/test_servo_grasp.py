@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from paramove.motion.planned_motion import PlannedMotion
+from paramove.motion.plans import PlannedMotion
 from tests.motion.servo_reaching import description, pick_and_place, reaching
 from tests.robots.servo_arms import ARMS, ArmModel
 

@@ -12,8 +12,7 @@ import pytest
 
 from paramove.motion.clear_plans import ClearPlans
 from paramove.motion.gripper_arm import GripperArm
-from paramove.motion.planned_motion import PlannedMotion
-from paramove.motion.plans import NoPlanError
+from paramove.motion.plans import NoPlanError, PlannedMotion
 from sim.places import STRIP_X, STRIP_Y
 from tests.motion.reaching import CORNERS, GRASP_Z, HOAP3, JOINTS, OPENINGS, at, checker, planner
 

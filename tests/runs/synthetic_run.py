@@ -8,7 +8,7 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.bus import topics
-from paramove.motion.planned_motion import RelocationOptions
+from paramove.motion.relocation import RelocationOptions
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPhase, TrajectoryPoint, TrajectoryStatus

@@ -9,7 +9,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.documents import Floats
 from paramove.motion.gripper_arm import GripperArm
-from paramove.motion.planned_motion import PlannedMotion, RestPose
+from paramove.motion.plans import PlannedMotion, RestPose
 
 REST_NS = 1_000_000_000  # a grasp pauses the arm for up to 0.8 s
 STALE_NS = 500_000_000

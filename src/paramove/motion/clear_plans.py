@@ -17,8 +17,7 @@ from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.clearance import ClearanceChecker
 from paramove.motion.gripper_arm import GripperArm
-from paramove.motion.planned_motion import PlannedMotion, RestPose
-from paramove.motion.plans import USUAL, Grasp, NoPlanError, check_number
+from paramove.motion.plans import USUAL, Grasp, NoPlanError, PlannedMotion, RestPose, check_number
 from paramove.motion.relocation import RelocationPlanner
 from paramove.motion.timing import minimum_jerk
 from paramove.robots import ArmKinematics

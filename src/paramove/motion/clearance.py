@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from paramove.documents import Floats, Ints
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.model_check import check_model
+from paramove.motion.plans import MAX_STANDING, check_number
 from paramove.robots import DescriptionError, RobotDescription
 
-MAX_STANDING = 8
 FAR_M = 0.05
 """Larger distances are not distinguished."""
 GRASPED_ABOVE_MIDDLE = 0.011
@@ -173,8 +173,7 @@ class ClearanceChecker:
     def _stand(self, standing: ArrayLike) -> list[int]:
         """Puts up the standing objects; their shapes."""
         places = np.asarray(standing, dtype=np.float64).reshape(-1, 2)
-        if len(places) > MAX_STANDING:
-            raise ValueError(f"{len(places)} standing objects, expected at most {MAX_STANDING}")
+        check_number(places)
         self._data.mocap_pos[:] = _HIDDEN
         self._data.mocap_pos[self._mocap(self._surface)] = self._surface_middle
         z = self.surface.z + self.cylinder.height / 2

@@ -9,14 +9,13 @@ from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
 from paramove.motion.clearance import ClearanceChecker
+from paramove.motion.plans import FARTHEST_M, metres
 from paramove.robots import Chain, OutOfReachError
 
 MIN_HEIGHT = 0.0005
 """m; of the hand's lowest point above the table."""
 _PITCHES_A_BAND = 41
 _GRID_M = 0.005
-FARTHEST_M = 2.0
-"""Maximum of each coordinate of a requested position."""
 _TRIED_POSITIONS = 100
 
 
@@ -126,8 +125,3 @@ class HandPoses:
                 if any(not self._obstacle(row) for row in self._poses(position, preferred, band)[1]):
                     return np.asarray(position)
         return None
-
-
-def metres(point: Floats) -> str:
-    """A position as text, in m."""
-    return f"({', '.join(f'{value:.3f}' for value in point)}) m"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from paramove.documents import Floats
+from paramove.motion.plans import metres
 from paramove.motion.timing import smoothed
 from paramove.robots import OutOfReachError, PlanarArm
 
@@ -59,7 +60,7 @@ def _shortest(solutions: Floats, extra: Floats, start: Floats, positions: Floats
     for number, (states, offset) in enumerate(zip(solutions, extra, strict=True), start=1):
         reachable = np.flatnonzero(np.isfinite(states).all(axis=-1))
         if len(reachable) == 0:
-            raise NoJointPathError(f"no posture reaches {_metres(positions[number])}, on the path")
+            raise NoJointPathError(f"no posture reaches {metres(positions[number])}, on the path")
         steps = states[reachable][:, None] - before[None]
         total = cost[None] + (steps**2).sum(axis=-1)
         total[np.abs(steps).max(axis=-1) > LARGEST_STEP] = np.inf
@@ -67,7 +68,7 @@ def _shortest(solutions: Floats, extra: Floats, start: Floats, positions: Floats
         cost = total[np.arange(len(reachable)), origin] + offset[reachable]
         possible = np.isfinite(cost)
         if not possible.any():
-            place = _metres(positions[number])
+            place = metres(positions[number])
             raise NoJointPathError(f"the joints would have to jump near {place}, on the path, to another posture")
         origins.append((states[reachable][possible], origin[possible]))
         before, cost = states[reachable][possible], cost[possible]
@@ -91,7 +92,3 @@ def _smoothed(arm: PlanarArm, positions: Floats, pitches: Floats, rough: Floats)
         if np.abs(near - rough[number]).max() < LARGEST_STEP:
             path[number] = near
     return path
-
-
-def _metres(point: Floats) -> str:
-    return f"({', '.join(f'{value:.3f}' for value in point)}) m"

@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from paramove.documents import Floats
-from paramove.motion.clearance import MAX_STANDING
-from paramove.motion.gripper_arm import GripperArm
-from paramove.motion.planned_motion import PlannedMotion, RestPose
+import numpy as np
+from numpy.typing import NDArray
 
+from paramove.documents import Floats
+from paramove.motion.gripper_arm import GripperArm
+
+FARTHEST_M = 2.0
+"""Maximum of each coordinate of a requested position; beyond it the inverse kinematics are numerically unusable."""
+MAX_STANDING = 8
+"""Number of objects that can be kept clear of at once."""
 HEIGHT_ERROR_M = 0.015
 """Of a height that was measured in an image."""
 
@@ -34,6 +39,68 @@ def check_number(standing: Floats) -> None:
     """Raises NoPlanError for more standing objects [M, 2] than can be kept clear of."""
     if len(standing) > MAX_STANDING:
         raise NoPlanError(f"{len(standing)} objects to keep clear of; at most {MAX_STANDING} at once are possible")
+
+
+@dataclass(frozen=True)
+class Held:
+    """An object in the gripper.
+
+    Attributes:
+        pitch: Of the hand when it grasped it, rad.
+        width: Of the object, m.
+        z: Where it was grasped, frame of the arm's base, m.
+        lowered: How far below the goal that was, m.
+    """
+
+    pitch: float
+    width: float
+    z: float
+    lowered: float
+
+
+@dataclass(frozen=True)
+class RestPose:
+    """Where an arm rests between motions.
+
+    Attributes:
+        angles: Arm joints and gripper, [J + 1], rad.
+        gripper: Position of the end effector, [3], m, frame of the arm's base.
+        measured: Whether the angles were measured; otherwise they are the end of a planned motion.
+        held: How it holds an object; None: not known, or nothing.
+    """
+
+    angles: Floats
+    gripper: Floats
+    measured: bool = False
+    held: Held | None = None
+
+
+@dataclass(frozen=True)
+class PlannedMotion:
+    """A motion from rest to rest, ready for the driver.
+
+    Attributes:
+        times: [K], s, from 0.
+        angles: Arm joints and gripper, [K, J + 1], rad.
+        gripper: Where the end effector shall be, [K, 3], m, frame of the arm's base.
+        holding: Whether an object is held, [K].
+        phases: Name and start of each phase.
+        elbow_turn: Largest turn of the elbow for a joint limit, rad.
+        held: See `RestPose`.
+    """
+
+    times: Floats
+    angles: Floats
+    gripper: Floats
+    holding: NDArray[np.bool_]
+    phases: tuple[tuple[str, float], ...]
+    elbow_turn: float
+    held: Held | None = None
+
+    @property
+    def end(self) -> RestPose:
+        """Where it ends."""
+        return RestPose(self.angles[-1], self.gripper[-1], held=self.held)
 
 
 @dataclass(frozen=True)
@@ -111,3 +178,8 @@ class MotionPlans(Protocol):
 
     def within_training(self, position: Floats) -> bool | None:
         """Whether the movement model was trained around this position; None if that is not known."""
+
+
+def metres(point: Floats) -> str:
+    """A position as text, in m."""
+    return f"({', '.join(f'{value:.3f}' for value in point)}) m"

@@ -18,12 +18,21 @@ from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.clearance import ClearanceChecker, UprightCylinder, WorkSurface
 from paramove.motion.gripper_arm import GripperArm
-from paramove.motion.hand_poses import HandPoses, metres
+from paramove.motion.hand_poses import HandPoses
 from paramove.motion.learned_path import SMOOTHING, LearnedPath, PlacedPerson
 from paramove.motion.modelled_movement import robot_movement
 from paramove.motion.planar_path import NoJointPathError, planar_path
-from paramove.motion.planned_motion import Held, PlannedMotion, RestPose
-from paramove.motion.plans import USUAL, Grasp, MisfitError, NoPlanError, check_number
+from paramove.motion.plans import (
+    USUAL,
+    Grasp,
+    Held,
+    MisfitError,
+    NoPlanError,
+    PlannedMotion,
+    RestPose,
+    check_number,
+    metres,
+)
 from paramove.motion.timing import minimum_jerk, ramped, rest_to_rest, smoothed
 from paramove.phmm import ParametricHMM
 from paramove.robots import DescriptionError, OutOfReachError, RobotDescription

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -14,14 +14,11 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.arm_state import ArmState
-from paramove.motion.planned_motion import PlannedMotion, RestPose, motion_message
-from paramove.motion.plans import Grasp, MisfitError, MotionPlans, NoPlanError
-from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
+from paramove.motion.plans import FARTHEST_M, Grasp, MisfitError, MotionPlans, NoPlanError, PlannedMotion, RestPose
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPhase, TrajectoryPoint, TrajectoryStatus
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.robots import OutOfReachError
 
-FARTHEST = 2.0
-"""m; beyond it the inverse kinematics are numerically unusable."""
 LARGEST = 1e6
 RESEND_NS = 400_000_000
 REMEMBERED_GOALS = 200
@@ -383,9 +380,9 @@ def point_of(goal: RelocationGoal, name: str) -> Floats:
     point = np.array([position.x, position.y, position.z])
     if not np.isfinite(point).all():
         raise GoalRejectedError(f"position {name!r} is {point.tolist()}; finite numbers in m are needed")
-    if np.abs(point).max() > FARTHEST:
+    if np.abs(point).max() > FARTHEST_M:
         raise GoalRejectedError(
-            f"position {name!r} is {point.tolist()} m; an arm reaches no farther than {FARTHEST:g} m"
+            f"position {name!r} is {point.tolist()} m; an arm reaches no farther than {FARTHEST_M:g} m"
         )
     return point
 
@@ -404,8 +401,8 @@ def hull_of(goal: RelocationGoal, name: str, plans: MotionPlans) -> RelocationSt
 def size_of(goal: RelocationGoal, name: str) -> float | None:
     """Its object's "width" or "height", m; None if the goal has none; raises GoalRejectedError if it is none."""
     size: float = getattr(goal, f"object_{name}_m")
-    if not 0.0 <= size <= FARTHEST:  # NaN is not either
-        raise GoalRejectedError(f"object_{name}_m is {size}; 0 (not known) to {FARTHEST:g} m expected")
+    if not 0.0 <= size <= FARTHEST_M:  # NaN is not either
+        raise GoalRejectedError(f"object_{name}_m is {size}; 0 (not known) to {FARTHEST_M:g} m expected")
     return size or None
 
 
@@ -429,3 +426,14 @@ def standing_of(goal: RelocationGoal) -> Floats:
 def centimetres(point: Floats) -> str:
     """A position as text, in cm."""
     return f"({point[0] * 100:.1f}, {point[1] * 100:.1f})"
+
+
+def motion_message(name: str, joints: Sequence[str], motion: PlannedMotion, now_ns: int) -> JointTrajectory:
+    """The trajectory called `name` of these joints, in the order of the motion's angles."""
+    message = JointTrajectory(id=name, joints=joints)
+    message.captured.FromNanoseconds(now_ns)
+    message.points.extend(
+        TrajectoryPoint(time_s=t, position_rad=q) for t, q in zip(motion.times, motion.angles, strict=True)
+    )
+    message.phases.extend(TrajectoryPhase(name=name, start_s=start) for name, start in motion.phases)
+    return message
