@@ -10,7 +10,7 @@ Publishes   arm/trajectory          JointTrajectory         event   rad
 from pathlib import Path
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
-from paramove.motion import MovementSource, SurfaceParameters, synthesizer_for
+from paramove.motion import MovementSource, SurfaceParameters, Synthesizer, plans_for
 from paramove.robots import RobotFolder
 
 SUBSCRIBES = (topics.RELOCATION_GOAL, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS)
@@ -29,7 +29,7 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes."""
     bus.starting("training or reading the reaching movement")
-    synthesizer = synthesizer_for(config.robot, config.side, config.movement, config.surface)
+    synthesizer = Synthesizer(plans_for(config.robot, config.side, config.movement, config.surface))
     handle = {
         topics.RELOCATION_GOAL: synthesizer.on_goal,
         topics.ARM_JOINT_STATES: synthesizer.on_joint_states,

@@ -49,8 +49,7 @@ def movement() -> RobotMovement:
 
 @cache
 def planner() -> RelocationPlanner:
-    velocity, acceleration = HOAP3.operating_velocity[JOINTS], HOAP3.operating_acceleration[JOINTS]
-    return RelocationPlanner(movement(), solver(), ARM, HOAP3.base_pose[JOINTS], velocity, acceleration)
+    return RelocationPlanner(movement(), solver(), HOAP3, ARM)
 
 
 @cache

@@ -240,7 +240,7 @@ def test_empty_and_impossible_goals_are_refused_and_the_arm_stays(wanted: Reloca
 def test_a_joint_motion_keeps_half_the_limits_and_ends_at_rest() -> None:
     plan = planner()
     end = HOAP3.base_pose[JOINTS] + np.deg2rad([-60.0, -20.0, 30.0, -40.0, -50.0, -60.0])
-    motion = joint_motion(HOAP3.base_pose[JOINTS], end, ARM.kinematics, plan.velocity, plan.acceleration, "retreat")
+    motion = joint_motion(plan, HOAP3.base_pose[JOINTS], end, "retreat")
     speed = np.diff(motion.angles, axis=0) / np.diff(motion.times)[:, None]
     assert (np.abs(speed) <= 0.5 * plan.velocity * 1.001).all()
     bend = np.diff(speed, axis=0) / np.diff(motion.times)[1:, None]

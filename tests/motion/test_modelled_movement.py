@@ -15,7 +15,7 @@ from paramove.motion.reaching_movement import ReachingMovement
 from paramove.motion.relocation import RelocationPlanner
 from paramove.phmm import MovementDescription, ParametricHMM, PolynomialPHMM
 from paramove.robots import DescriptionError
-from tests.motion.reaching import HOAP3, JOINTS, reaching_model, solver
+from tests.motion.reaching import HOAP3, reaching_model, solver
 from tests.motion.touching import DESCRIPTION, FAR, NEAR, touching, touching_model
 
 
@@ -166,4 +166,4 @@ def test_the_training_is_kept_in_the_file(tmp_path: Any) -> None:
 def test_an_arm_of_which_nobody_knows_how_it_comes_above_a_table_is_named() -> None:
     left = HOAP3.arm("left")
     with pytest.raises(DescriptionError, match=r"left_shoulder_pitch.*above_table"):
-        RelocationPlanner(touching(2), solver(), left, HOAP3.base_pose[JOINTS], np.ones(6), np.ones(6))
+        RelocationPlanner(touching(2), solver(), HOAP3, left)

@@ -16,7 +16,7 @@ from paramove.motion.recorded_reaching import people_model, train_people_model
 from paramove.motion.relocation import RelocationPlanner
 from paramove.phmm import ModelFileError, PolynomialPHMM
 from tests.demonstrations.synthetic_recordings import write_table
-from tests.motion.reaching import ARM, GRASP_Z, HOAP3, JOINTS, at, solver
+from tests.motion.reaching import ARM, GRASP_Z, HOAP3, at, solver
 
 DATA = Path(os.environ.get("PARAMOVE_DATA") or Path(__file__).parents[3] / "shared" / "data")
 NAME = "table_reach"
@@ -127,9 +127,7 @@ def test_left_of_the_shoulder_is_within_their_training_and_right_of_it_is_not(mo
 
 @needs_people
 def test_motions_whose_elbow_turns_at_a_limit_stay_within_it(model: PolynomialPHMM) -> None:
-    velocity, acceleration = HOAP3.operating_velocity[JOINTS], HOAP3.operating_acceleration[JOINTS]
-    base = HOAP3.base_pose[JOINTS]
-    planner = RelocationPlanner(robot_movement(model, solver().length), solver(), ARM, base, velocity, acceleration)
+    planner = RelocationPlanner(robot_movement(model, solver().length), solver(), HOAP3, ARM)
     held = at((0.173, -0.0587), GRASP_Z + planner.options.lift)
     angles = planner.deliver(held, at((0.12774, -0.093111))).angles[:, :5]
     assert (angles < HOAP3.soft_upper[ARM.indices]).all()

@@ -1,4 +1,4 @@
-"""Putting a synthesizer together from files that do not fit."""
+"""Putting a planner together from files that do not fit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from paramove.motion import setup
-from paramove.motion.setup import MovementSource, SurfaceParameters, plans_for, synthesizer_for
+from paramove.motion.setup import MovementSource, SurfaceParameters, plans_for
 from paramove.robots.description import DescriptionError
 from tests.motion.reaching import ROBOT_FOLDER, at, reaching_model
 from tests.motion.touching import touching_model
@@ -24,7 +24,7 @@ def movement(tmp_path: Path) -> MovementSource:
 
 def test_an_arm_that_the_robot_lacks_is_named(movement: MovementSource) -> None:
     with pytest.raises(DescriptionError, match="describes the arms right, left, found side 'middle'"):
-        synthesizer_for(ROBOT_FOLDER, "middle", movement, SurfaceParameters())
+        plans_for(ROBOT_FOLDER, "middle", movement, SurfaceParameters())
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_a_model_file_without_what_the_description_names(
     assert old in text
     model.write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(DescriptionError, match=f"hoap3.xml (does not fit|has no) .*({words})"):
-        synthesizer_for(folder, "right", movement, SurfaceParameters())
+        plans_for(folder, "right", movement, SurfaceParameters())
 
 
 def test_movement_is_trained_where_nothing_can_be_kept(

@@ -10,7 +10,7 @@ from paramove.motion.modelled_movement import ModelledMovement
 from paramove.motion.relocation import RelocationPlanner
 from paramove.motion.timing import minimum_jerk
 from paramove.phmm import MovementDescription, PolynomialPHMM
-from tests.motion.reaching import ARM, HOAP3, JOINTS, solver
+from tests.motion.reaching import ARM, HOAP3, solver
 
 POINTS = ("shoulder", "elbow", "knuckle", "index", "thumb")
 DESCRIPTION = MovementDescription("touching", POINTS, frame="body", duration=0.8, arrival=1.0)
@@ -63,5 +63,4 @@ def touching(degree: int = 1) -> ModelledMovement:
 
 @cache
 def touching_planner(degree: int = 1) -> RelocationPlanner:
-    velocity, acceleration = HOAP3.operating_velocity[JOINTS], HOAP3.operating_acceleration[JOINTS]
-    return RelocationPlanner(touching(degree), solver(), ARM, HOAP3.base_pose[JOINTS], velocity, acceleration)
+    return RelocationPlanner(touching(degree), solver(), HOAP3, ARM)

@@ -13,4 +13,4 @@ from .servo_arm_reaching import ServoArmReaching as ServoArmReaching
 from .setup import MovementSource as MovementSource
 from .setup import SurfaceParameters as SurfaceParameters
 from .setup import plans_for as plans_for
-from .setup import synthesizer_for as synthesizer_for
+from .synthesizer import Synthesizer as Synthesizer

@@ -6,12 +6,10 @@ the measured pose to its start. No movement was learned for that.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
@@ -19,8 +17,7 @@ from paramove.motion.clearance import ClearanceChecker
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.plans import USUAL, Grasp, NoPlanError, PlannedMotion, RestPose, check_number
 from paramove.motion.relocation import RelocationPlanner
-from paramove.motion.timing import minimum_jerk
-from paramove.robots import ArmKinematics
+from paramove.motion.timing import PEAK_ACCELERATION, PEAK_VELOCITY, minimum_jerk
 
 MIN_CLEARANCE = 0.005  # m, of planned paths from table, body and standing objects
 _HIGHER_ENTRY = 0.065
@@ -36,34 +33,23 @@ JOINED_WITHIN = np.deg2rad(0.01)
 
 
 def joint_motion(
-    start: ArrayLike,
-    end: ArrayLike,
-    kinematics: ArmKinematics,
-    velocity: Floats,
-    acceleration: Floats,
-    phase: str,
-    period: float = 0.005,
-    holding: bool = False,
+    planner: RelocationPlanner, start: Floats, end: Floats, phase: str, holding: bool = False
 ) -> PlannedMotion:
     """All joints together from `start` to `end`, from rest to rest.
 
     Args:
+        planner: Its arm, the limits of the joints, and the period of the samples.
         start, end: Arm joints and fingers, [6], rad.
-        kinematics: Of the arm.
-        velocity, acceleration: Largest of each joint, [6], rad/s and rad/s².
         phase: Name of the motion's only phase.
-        period: Of the samples, s.
         holding: Whether an object is held.
     """
-    a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-    distance = np.abs(b - a)
-    # Peaks of the minimum-jerk profile: velocity 15/8 d/T, acceleration 10/√3 d/T².
-    by_velocity = 1.875 * distance / (LIMIT_FRACTION * velocity)
-    by_acceleration = np.sqrt(5.7735 * distance / (LIMIT_FRACTION * acceleration))
+    distance, period = np.abs(end - start), planner.options.sample_period
+    by_velocity = PEAK_VELOCITY * distance / (LIMIT_FRACTION * planner.velocity)
+    by_acceleration = np.sqrt(PEAK_ACCELERATION * distance / (LIMIT_FRACTION * planner.acceleration))
     duration = max(MIN_DURATION_S, float(by_velocity.max()), float(by_acceleration.max()))
     n = int(np.ceil(duration / period))
-    angles = a + minimum_jerk(np.arange(n + 1) / n)[:, None] * (b - a)
-    gripper = kinematics.forward(angles[:, :5]).gripper
+    angles = start + minimum_jerk(np.arange(n + 1) / n)[:, None] * (end - start)
+    gripper = planner.arm.kinematics.forward(angles[:, :5]).gripper
     times: Floats = period * np.arange(n + 1, dtype=np.float64)
     return PlannedMotion(times, angles, gripper, np.full(n + 1, holding), ((phase, 0.0),), 0.0)
 
@@ -87,10 +73,7 @@ def joined(first: PlannedMotion, then: PlannedMotion) -> PlannedMotion:
     )
 
 
-class _Alternative(Protocol):
-    def __call__(self) -> PlannedMotion: ...
-
-
+_Alternative = Callable[[], PlannedMotion]
 _Choices = Mapping[str, object]
 """Phase -> choice of an alternative in it. Equal choices give equal motions in a phase; so do phases not named."""
 
@@ -182,28 +165,14 @@ class ClearPlans:
             partial(self._from, start, alternative, holding)
             for alternative in ([*put_down, *leave] if holding else leave)
         ]
-        straight = partial(self._straight, start, planner.base_angles, "retreat")
+        straight = partial(joint_motion, planner, start, planner.base_angles, "retreat")
         high = hand[2] > grasped + _HIGH and not holding
         return self._first([straight, *learned] if high else [*learned, straight], standing)
 
     def _from(self, start: Floats, alternative: _Alternative, holding: bool) -> PlannedMotion:
         """The motion, preceded by a straight path to its first sample."""
         motion = alternative()
-        return joined(self._straight(start, motion.angles[0], "gather", holding), motion)
-
-    def _straight(self, start: Floats, end: Floats, phase: str, holding: bool = False) -> PlannedMotion:
-        planner = self.planner
-        kinematics = planner.arm.kinematics
-        return joint_motion(
-            start,
-            end,
-            kinematics,
-            planner.velocity,
-            planner.acceleration,
-            phase,
-            planner.options.sample_period,
-            holding,
-        )
+        return joined(joint_motion(self.planner, start, motion.angles[0], "gather", holding), motion)
 
     def reach(self, position: Floats, standing: Floats, start: RestPose | None = None) -> PlannedMotion:
         """Go to `position` with an open hand."""

@@ -18,7 +18,7 @@ from paramove.motion.arm_pose import ArmPoseSolver
 from paramove.motion.plans import PlannedMotion
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.motion.timing import fade_in, largest_excess, minimum_jerk, resampled, slowed_times, soft_ends
-from paramove.robots import AboveTable, Arm, DescriptionError
+from paramove.robots import AboveTable, Arm, DescriptionError, RobotDescription
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SLOWING_ROUNDS = 6
@@ -90,35 +90,28 @@ class RelocationPlanner:
     Args:
         movement: The converted reaching movement.
         solver: Inverse kinematics of the arm.
+        robot: The robot's description: base pose and operating limits.
         arm: The arm's joints and fingers.
-        base_angles: Base pose of the five joints and the fingers, [6], rad; every motion starts or ends there or where
-            the last one ended.
-        velocity: Largest speed of the five joints and the fingers, [6], rad/s.
-        acceleration: Largest acceleration of them, [6], rad/s².
-        options: Sizes.
 
     Raises DescriptionError for a movement that begins above a table, and an arm that has no `above_table`.
+
+    Attributes:
+        options: Sizes.
+        velocity: Largest speed of the five joints and the fingers, [6], rad/s.
+        acceleration: Largest acceleration of them, [6], rad/s².
+        base_angles: Their base pose, [6], rad; every motion starts or ends there or where the last one ended.
     """
 
-    def __init__(
-        self,
-        movement: ReachingMovement,
-        solver: ArmPoseSolver,
-        arm: Arm,
-        base_angles: ArrayLike,
-        velocity: ArrayLike,
-        acceleration: ArrayLike,
-        options: RelocationOptions | None = None,
-    ) -> None:
+    def __init__(self, movement: ReachingMovement, solver: ArmPoseSolver, robot: RobotDescription, arm: Arm) -> None:
         self.movement, self.solver, self.arm = movement, solver, arm
-        self.options = options or RelocationOptions()
+        self.options = RelocationOptions()
         if movement.begins_above_table and arm.above_table is None:
             raise DescriptionError(
                 f"the arm of {arm.joints[0]} has no above_table in its robot.yaml; this movement begins above a table"
             )
-        self.velocity = np.asarray(velocity, dtype=np.float64)
-        self.acceleration = np.asarray(acceleration, dtype=np.float64)
-        self.base_angles = base = np.asarray(base_angles, dtype=np.float64)
+        joints = [*arm.indices, arm.fingers_index]
+        self.velocity, self.acceleration = robot.operating_velocity[joints], robot.operating_acceleration[joints]
+        self.base_angles = base = robot.base_pose[joints]
         self._base = self._pose_of(base[None, :5])
         self._base_opening = float((base[5] - arm.fingers_closed) / (arm.fingers_open - arm.fingers_closed))
 
@@ -224,11 +217,9 @@ class RelocationPlanner:
         opening_path = _crossfaded(np.full(n, opened), opening_path, n)
         opening_path = _crossfaded(opening_path, np.full(n, self._base_opening), n)
         level = fade_in(n, self._level_states(n))[::-1]
-        backwards = self._begun(ArmPoses.from_stacked(states.stacked()[::-1]))
-        states = ArmPoses.from_stacked(backwards.stacked()[::-1])
-        first = path.end.stacked()[0]
+        values = self._begun(states[::-1])[::-1].stacked()
         fade = fade_in(n, n // 2)[::-1, None]
-        states = ArmPoses.from_stacked(states.stacked() + fade * (first - states.stacked()[0]))
+        states = ArmPoses.from_stacked(values + fade * (path.end.stacked()[0] - values[0]))
         self._synthesised(path, "retreat", states, opening_path, level, o.retreat_duration)
         if self.movement.begins_above_table:
             self._way_to_table(path, "retreat", states[-1:], backwards=True)

@@ -1,4 +1,4 @@
-"""A synthesizer put together from a robot's folder, a movement and a working surface."""
+"""A planner put together from a robot's folder, a movement and a working surface."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from paramove.motion.reaching_file import load_reaching_model
 from paramove.motion.recorded_reaching import people_model
 from paramove.motion.relocation import RelocationPlanner
 from paramove.motion.servo_arm_reaching import ServoArmReaching
-from paramove.motion.synthesizer import Synthesizer
 from paramove.phmm import ParametricHMM
 from paramove.robots import RobotDescription
 
@@ -50,12 +49,10 @@ class MovementSource(BaseModel):
         """The model, cached in the user's folder once trained. Raises ModelFileError for a bad `file`."""
         if self.file is not None:
             return load_reaching_model(self.file)
-        cache = _cache_folder()
+        folder = _cache_folder()
         if self.model == "table_reach":
-            return people_model(self.model, cache)
-        if cache is None:
-            return train_reaching_model(self.seed)
-        return train_reaching_model(self.seed, cache=cache / f"reaching_{self.seed}.npz")
+            return people_model(self.model, folder)
+        return train_reaching_model(self.seed, cache=None if folder is None else folder / f"reaching_{self.seed}.npz")
 
 
 def _cache_folder() -> Path | None:
@@ -81,11 +78,6 @@ class SurfaceParameters(BaseModel):
     object_height: float = 0.050
 
 
-def synthesizer_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> Synthesizer:
-    """Everything that a synthesizer needs, from files."""
-    return Synthesizer(plans_for(robot_folder, side, movement, surface))
-
-
 def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> MotionPlans:
     """The planner of the robot's movements, from files: of its servo arm, or of its arm on this side."""
     robot = RobotDescription.load(robot_folder)
@@ -94,15 +86,6 @@ def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: 
         return ServoArmReaching(robot, movement.trained(), cylinder=cylinder)
     arm = robot.arm(side)
     solver = ArmPoseSolver(robot, arm)
-    converted = robot_movement(movement.trained(), solver.length)
-    joints = [*arm.indices, arm.fingers_index]
-    planner = RelocationPlanner(
-        converted,
-        solver,
-        arm,
-        robot.base_pose[joints],
-        robot.operating_velocity[joints],
-        robot.operating_acceleration[joints],
-    )
+    planner = RelocationPlanner(robot_movement(movement.trained(), solver.length), solver, robot, arm)
     box, gripper_arm = WorkSurface(surface.x, surface.y, surface.z), GripperArm.of(robot, side)
     return ClearPlans(gripper_arm, planner, ClearanceChecker(robot, gripper_arm, box, cylinder))

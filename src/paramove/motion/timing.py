@@ -10,6 +10,8 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from paramove.documents import Floats
 
+PEAK_VELOCITY, PEAK_ACCELERATION = 1.875, 5.7735
+"""Of `minimum_jerk`: 15/8 d/T and 10/√3 d/T² for a distance d in a time T."""
 _WINDOW_S = 0.12
 _ACCELERATION_ROUNDS = 6
 
