@@ -37,7 +37,7 @@ class HandPoses:
         away = np.abs(arm.all_joint_angles(rest.position, float(rest.pitch)) - base).sum(axis=-1)
         self._usual = 0 if np.isnan(away).all() else int(np.nanargmin(away))
 
-    def pitch_at(self, target: ArrayLike, preferred: float, band: tuple[float, float]) -> float:
+    def pitch_at(self, target: ArrayLike, preferred: float, band: Floats) -> float:
         """The pitch in a band, nearest to the preferred one, that reaches a position clear of the table; rad.
 
         Args:
@@ -60,19 +60,23 @@ class HandPoses:
             obstacles.append(obstacle)
         raise self._out_of_reach(goal, preferred, band, obstacles)
 
-    def ahead(self, height: float, band: tuple[float, float]) -> Floats:
+    def ahead(self, height: float, band: Floats) -> Floats:
         """The positions of a row straight ahead at this height that are reached with a pitch of a band, [N, 3], m."""
         ahead = np.arange(0.02, 0.5, _GRID_M)
         positions = np.stack([ahead, np.zeros_like(ahead), np.full_like(ahead, height)], axis=1)
-        solutions = self._chain.kinematics.all_joint_angles(positions[:, None], np.linspace(*band, 13)[None])
+        return self._reached(positions, np.linspace(band[0], band[1], 13))
+
+    def _reached(self, positions: Floats, pitches: Floats) -> Floats:
+        """Those of the positions [N, 3] that are reached with one of the pitches [P]."""
+        solutions = self._chain.kinematics.all_joint_angles(positions[:, None], pitches[None])
         return np.asarray(positions[np.isfinite(solutions).all(axis=-1).any(axis=-1).any(axis=-1)])
 
-    def _poses(self, goal: Floats, preferred: float, band: tuple[float, float]) -> tuple[Floats, Floats]:
+    def _poses(self, goal: Floats, preferred: float, band: Floats) -> tuple[Floats, Floats]:
         """Pitches in order of their distance from the preferred one, with the joint angles, [P] and [P, J].
 
         Those of the usual posture come first.
         """
-        pitches = np.unique([*np.linspace(*band, _PITCHES_A_BAND), np.clip(preferred, *band)])
+        pitches = np.unique([*np.linspace(band[0], band[1], _PITCHES_A_BAND), np.clip(preferred, band[0], band[1])])
         pitches = pitches[np.argsort(np.abs(pitches - preferred), kind="stable")]
         solutions = self._chain.kinematics.all_joint_angles(goal, pitches)
         good = np.asarray(np.isfinite(solutions).all(axis=-1))
@@ -89,9 +93,7 @@ class HandPoses:
         touching = self._clearance.touching(pose)
         return "" if touching is None else f"its {touching[0]} would touch its {touching[1]} there"
 
-    def _out_of_reach(
-        self, goal: Floats, preferred: float, band: tuple[float, float], obstacles: Sequence[str]
-    ) -> OutOfReachError:
+    def _out_of_reach(self, goal: Floats, preferred: float, band: Floats, obstacles: Sequence[str]) -> OutOfReachError:
         lowest, highest = np.rad2deg(band)
         cause = " or ".join(dict.fromkeys(obstacles)) or self._cause(goal, preferred)
         message = f"{metres(goal)} cannot be reached with the hand {lowest:.0f} to {highest:.0f} deg down: {cause}"
@@ -109,7 +111,7 @@ class HandPoses:
             return str(error).split("is out of reach: ")[-1].split("; ")[0]
         return f"the hand would have to be {np.rad2deg(pitch):.0f} deg down"
 
-    def _nearest(self, goal: Floats, preferred: float, band: tuple[float, float]) -> Floats | None:
+    def _nearest(self, goal: Floats, preferred: float, band: Floats) -> Floats | None:
         """Nearest position of a grid in the upright plane through the arm's axis and the goal that can be reached."""
         axis = np.array([*self._chain.kinematics.yaw_axis, 0.0])
         ahead, side = (goal - axis)[:2]
@@ -118,9 +120,7 @@ class HandPoses:
         radius, height = grid.reshape(-1, 2).T
         for turned in (azimuth, 0.75 * azimuth, 0.5 * azimuth):
             positions = axis + np.stack([radius * np.cos(turned), radius * np.sin(turned), height], axis=-1)
-            pitches = np.linspace(*band, 9)
-            solutions = self._chain.kinematics.all_joint_angles(positions[:, None], pitches[None])
-            reached = positions[np.isfinite(solutions).all(axis=-1).any(axis=-1).any(axis=-1)]
+            reached = self._reached(positions, np.linspace(band[0], band[1], 9))
             for position in reached[np.argsort(np.linalg.norm(reached - goal, axis=-1))][:_TRIED_POSITIONS]:
                 if any(not self._obstacle(row) for row in self._poses(position, preferred, band)[1]):
                     return np.asarray(position)

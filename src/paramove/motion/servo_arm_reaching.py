@@ -33,7 +33,7 @@ from paramove.motion.plans import (
     check_number,
     metres,
 )
-from paramove.motion.timing import minimum_jerk, ramped, rest_to_rest, smoothed
+from paramove.motion.timing import PEAK_VELOCITY, minimum_jerk, ramped, rest_to_rest, smoothed
 from paramove.phmm import ParametricHMM
 from paramove.robots import DescriptionError, OutOfReachError, RobotDescription
 
@@ -63,7 +63,6 @@ class ServoArmReaching:
     Args:
         description: Of a robot with a chain.
         model: Of a person's reaching, its parameter the position that is reached; scaled to the size of the arm.
-        options: Sizes.
         cylinder: Shape of the objects that stand on the table.
 
     Raises:
@@ -74,20 +73,21 @@ class ServoArmReaching:
         arm: Joints, the gripper last; its base pose is the end of motions that go home.
         lower, upper: Limits of the angles.
         start_tolerance: Maximum distance of a motion's start from the limits, rad.
+        options: Sizes.
     """
 
     def __init__(
         self,
         description: RobotDescription,
         model: ParametricHMM,
-        options: ServoReachingOptions | None = None,
         cylinder: UprightCylinder | None = None,
     ) -> None:
         chain = description.chain
         if chain is None:
             raise DescriptionError(f"{description.name} has no chain in its robot.yaml: it is not a servo arm")
         self._arm, self.arm = chain.kinematics, GripperArm.of(description, "")
-        self.options = o = options or ServoReachingOptions()
+        self.options = o = ServoReachingOptions()
+        self._reach_band, self._grasp_band = np.deg2rad(o.reach_band_deg), np.deg2rad(o.grasp_band_deg)
         self.offer_opening, self.closed_opening = o.work_opening, o.closed_opening
         indices = [*chain.indices, chain.gripper_index]
         self.base_angles = self.arm.base_angles
@@ -102,7 +102,7 @@ class ServoArmReaching:
         self._clearance = ClearanceChecker(description, self.arm, table, cylinder)
         self._poses = HandPoses(chain, self._clearance, self.arm.angle_of(o.work_opening), self.base_angles[:-1])
         length = float(np.hypot(*self._arm.upper_arm) + np.hypot(*self._arm.forearm) + self._arm.hand[0])
-        ahead = self._poses.ahead(o.table_z, self._band(o.grasp_band_deg))
+        ahead = self._poses.ahead(o.table_z, self._grasp_band)
         self._usual_reach = float(np.quantile(ahead[:, 0], USUAL_REACH) - self._arm.yaw_axis[0])
         self._person = PlacedPerson(robot_movement(model, length), ahead.mean(axis=0), self._arm.yaw_axis, POINTS)
         self._fixed_finger, self._widths = chain.fixed_finger, chain.object_width
@@ -121,7 +121,7 @@ class ServoArmReaching:
             NoPlanError: There is no clear path.
         """
         goal = np.asarray(position, dtype=np.float64)
-        pitch = self._poses.pitch_at(goal, np.deg2rad(self.options.pitch_deg), self._band(self.options.reach_band_deg))
+        pitch = self._poses.pitch_at(goal, np.deg2rad(self.options.pitch_deg), self._reach_band)
         motion = self._begun(start, standing)
         path = self._learned(self._person.approach, goal)
         self._go(motion, "reach", goal, pitch, path, self.options.work_opening, self.options.clearance)
@@ -175,7 +175,7 @@ class ServoArmReaching:
     def hold(self, start: RestPose, position: ArrayLike, standing: Floats = NOTHING) -> PlannedMotion:
         """Carry the held object to `position` and stay there. Errors as for `reach`."""
         point, o = np.asarray(position, dtype=np.float64), self.options
-        pitch = self._poses.pitch_at(point, np.deg2rad(o.pitch_deg), self._band(o.reach_band_deg))
+        pitch = self._poses.pitch_at(point, np.deg2rad(o.pitch_deg), self._reach_band)
         motion = self._begun(start, standing)
         motion.held = start.held
         path = self._learned(self._person.approach, point)
@@ -192,7 +192,7 @@ class ServoArmReaching:
         """Open the gripper where it is, draw it up, go back to the base pose. Errors as for `reach`."""
         motion = self._begun(here, standing)
         self._fingers(motion, "release", self.options.work_opening)
-        self._home(motion, "retreat", self._before_roll(motion.end)[1])
+        self._home(motion, self._before_roll(motion.end)[1])
         return self._finished(motion)
 
     def home(
@@ -207,7 +207,7 @@ class ServoArmReaching:
             below = np.array([*hand[:2], min(hand[2], grasped_z)])
             self._put(motion, below, self._grasp_pitch(below, None if held is None else held.pitch))
         else:
-            self._home(motion, "retreat", hand)
+            self._home(motion, hand)
         return self._finished(motion)
 
     def within_training(self, target: ArrayLike) -> bool | None:
@@ -221,7 +221,7 @@ class ServoArmReaching:
         self._line(motion, "place", point, pitch, holding=True)
         self._fingers(motion, "release", self.options.work_opening)
         self._line(motion, "withdraw", *self._above(point, pitch))
-        self._home(motion, "retreat", point)
+        self._home(motion, point)
 
     def _over(
         self, motion: MotionRows, name: str, point: Floats, pitch: float, opening: float, holding: bool = False
@@ -231,12 +231,15 @@ class ServoArmReaching:
         path = self._learned(self._person.approach, above)
         self._go(motion, name, above, above_pitch, path, opening, self.options.carry_clearance, holding)
 
-    def _home(self, motion: MotionRows, name: str, from_point: Floats) -> None:
+    def _home(self, motion: MotionRows, from_point: Floats) -> None:
+        """By the learned retreat to above the base pose; the last bit, the roll and the gripper, in joint angles."""
         base = self.base_angles
         path = self._learned(self._person.retreat, from_point)
         pitch = float(self._arm.forward(base[:-1]).pitch)
-        self._go(motion, name, self.arm.position(base), pitch, path, None, self.options.clearance)
-        self._joints(motion, name, base)
+        self._go(motion, "retreat", self.arm.position(base), pitch, path, None, self.options.clearance)
+        if np.abs(motion.end - base).max() > 1e-9:
+            rows = rest_to_rest(np.linspace(motion.end, base, 6), 0.2, self._period, self._limits)
+            motion.add("retreat", rows, False)
 
     def _go(
         self,
@@ -302,7 +305,7 @@ class ServoArmReaching:
             raise motion.no_plan(f"no straight line leads to {metres(point)}: {error}") from error
         arm[:, 4:] = motion.end[4:-1]
         knots = np.concatenate([arm, np.full((n, 1), motion.end[-1])], axis=1)
-        duration = 1.875 * distance / self.options.speed  # the peak of the minimum-jerk profile
+        duration = PEAK_VELOCITY * distance / self.options.speed
         rows = self._inside(rest_to_rest(knots, duration, self._period, self._limits))
         fault = self._fault(motion, rows, self.options.clearance, holding)
         if fault:
@@ -316,11 +319,6 @@ class ServoArmReaching:
         rows = rest_to_rest(knots, self.options.gripper_duration, self._period, self._limits)
         rest = np.repeat(rows[-1:], round(self.options.settle_duration / self._period), axis=0)
         motion.add(name, np.concatenate([rows, rest]), closing)
-
-    def _joints(self, motion: MotionRows, name: str, end: Floats) -> None:
-        """The last bit in joint angles: the roll, and the gripper."""
-        if np.abs(motion.end - end).max() > 1e-9:
-            motion.add(name, rest_to_rest(np.linspace(motion.end, end, 6), 0.2, self._period, self._limits), False)
 
     def _along(self, motion: MotionRows, path: LearnedPath, point: Floats, pitch: float, gripper: Floats) -> Floats:
         start, here = self._before_roll(motion.end)
@@ -399,7 +397,7 @@ class ServoArmReaching:
     def _grasp_pitch(self, point: Floats, preferred: float | None = None) -> float:
         """The pitch nearest to the preferred one, or else to that of the options, with which it grasps there."""
         wanted = np.deg2rad(self.options.pitch_deg) if preferred is None else preferred
-        return self._poses.pitch_at(point, wanted, self._band(self.options.grasp_band_deg))
+        return self._poses.pitch_at(point, wanted, self._grasp_band)
 
     def _pitch_of_both(self, source: Floats, target: Floats | None) -> float:
         """The pitch to grasp with at `source`, if possible one that reaches `target`, or most positions, too."""
@@ -470,15 +468,10 @@ class ServoArmReaching:
 
     def _above(self, point: Floats, pitch: float) -> tuple[Floats, float]:
         above = point + self.options.lift * _UP
-        return above, self._poses.pitch_at(above, pitch, self._band(self.options.reach_band_deg))
+        return above, self._poses.pitch_at(above, pitch, self._reach_band)
 
     def _inside(self, angles: Floats) -> Floats:
         return np.asarray(np.clip(angles, self.lower, self.upper))
-
-    @staticmethod
-    def _band(degrees: tuple[float, float]) -> tuple[float, float]:
-        lowest, highest = np.deg2rad(degrees)
-        return float(lowest), float(highest)
 
 
 @dataclass(frozen=True)
