@@ -40,7 +40,7 @@ def test_the_gripper_is_at_the_target_when_the_movement_says_so(state_of: str) -
     np.testing.assert_allclose(reached, targets, rtol=0, atol=1e-6)
     whole = converted.poses(parameters[7])
     np.testing.assert_allclose(whole.gripper[state], targets[7], rtol=0, atol=1e-6)
-    assert len(whole) == converted.n_states
+    assert len(whole) == converted.means.shape[1]
 
 
 def test_the_demonstrations_nearly_meet_their_targets_already() -> None:
@@ -76,7 +76,7 @@ def test_a_longer_arm_makes_the_same_movement_larger() -> None:
 
 def test_states_of_arrival_and_grasp_are_about_those_of_the_thesis() -> None:
     """States 37 and 45 of 80, counted from 1."""
-    assert movement().n_states == 80
+    assert movement().means.shape[1] == 80
     assert abs(movement().reach_state + 1 - 37) <= 3
     assert abs(movement().release_state + 1 - 45) <= 3
     assert movement().reach_state < movement().release_state
@@ -105,16 +105,21 @@ def test_other_poses_of_the_person_are_converted_alike() -> None:
     np.testing.assert_allclose(poses.stacked(), converted.means[3], rtol=0, atol=1e-12)
 
 
+def with_fingers(finger_to_thumb: np.ndarray) -> ArmPoses:
+    """Arm poses of which only the hand matters."""
+    return ArmPoses(np.zeros_like(finger_to_thumb), np.zeros_like(finger_to_thumb), finger_to_thumb)
+
+
 def test_opening_goes_from_one_to_nought() -> None:
     converted = movement()
     sizes = np.linspace(0.5 * converted.o_min, 1.5 * converted.o_max, 40)
-    opening = converted.opening(sizes[:, None] * [0.6, 0.0, 0.8])
+    opening = converted.openings(with_fingers(sizes[:, None] * [0.6, 0.0, 0.8]))
     assert (np.diff(opening) >= 0).all()
     np.testing.assert_allclose(opening[[0, -1]], [0.0, 1.0], rtol=0, atol=0)
-    middle = converted.opening([[0.5 * (converted.o_min + converted.o_max), 0.0, 0.0]])
+    middle = converted.openings(with_fingers(np.array([[0.5 * (converted.o_min + converted.o_max), 0.0, 0.0]])))
     np.testing.assert_allclose(middle, 0.5, rtol=0, atol=1e-12)
     between = converted.poses(converted.grid.points().mean(axis=0))
-    course = converted.opening(between.finger_to_thumb)
+    course = converted.openings(between)
     grasping = course[converted.reach_state : converted.release_state + 1]
     assert grasping[0] == grasping.max()
     assert grasping[0] - grasping.min() > 0.5

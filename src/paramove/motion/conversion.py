@@ -41,9 +41,8 @@ class RobotMovement(ReachingMovement):
         o_min, o_max: Minimum and maximum distance of finger and thumb after scaling, m.
         reach_state: State in which the gripper is at the target, still open (T of 5.2.5).
         release_state: Last state in which the object is held (T′).
-        duration: Mean duration of the demonstrations, s.
         shoulder: p̄, the demonstrator's mean shoulder, which is the origin here, [3], m, frame of the demonstrations.
-        elbow_interpolation: "carried" interpolates the elbow as part of an arm (`elbow_interpolation.py`), "linear" as
+        elbow_interpolation: "carried" interpolates the elbow as part of an arm "linear" as
             a point on its own, as the thesis does.
     """
 
@@ -54,7 +53,6 @@ class RobotMovement(ReachingMovement):
     o_max: float
     reach_state: int
     release_state: int
-    duration: float
     shoulder: Floats
     elbow_interpolation: ElbowInterpolation = "carried"
 
@@ -75,12 +73,7 @@ class RobotMovement(ReachingMovement):
         """
         description = model.description or MovementDescription()
         person = points_of(model.means_, description.point_names)
-        if not 0.0 < description.arrival < description.grasp < 1.0:
-            raise ValueError(
-                f"the model of {description.action!r} gives arrival {description.arrival} and grasp "
-                f"{description.grasp}; "
-                "a reaching action has 0 < arrival < grasp < 1"
-            )
+        reach_state, release_state = grasp_states(description, model.n_states)
         shoulder = person["shoulder"].mean(axis=(0, 1))  # p̄
         elbow, gripper, _ = arm_of(person, shoulder)
         lengths = np.linalg.norm(elbow, axis=-1) + np.linalg.norm(gripper - elbow, axis=-1)
@@ -88,16 +81,14 @@ class RobotMovement(ReachingMovement):
         means = np.concatenate(arm_of(person, shoulder), axis=-1) * scale  # (5.7)
         size = np.linalg.norm(means[..., 6:], axis=-1)
         grid = ParameterGrid((model.grid_.origin - shoulder) * scale, model.grid_.edges * scale, model.grid_.knots)
-        last = model.n_states - 1
         return cls(
             grid=grid,
             means=means,
             scale=scale,
             o_min=float(size.min()),
             o_max=float(size.max()),
-            reach_state=round(description.arrival * last),
-            release_state=round(description.grasp * last),
-            duration=description.duration,
+            reach_state=reach_state,
+            release_state=release_state,
             shoulder=shoulder,
             elbow_interpolation=elbow_interpolation,
         )
@@ -118,11 +109,6 @@ class RobotMovement(ReachingMovement):
     def centre(self) -> Floats:
         """Mean of the grid's targets, [3], m."""
         return np.asarray(self.grid.points().mean(axis=0))
-
-    @property
-    def n_states(self) -> int:
-        """N, the number of states."""
-        return int(self.means.shape[1])
 
     def poses(self, parameter: ArrayLike) -> ArmPoses:
         """State means for one parameter [3] of the grid: N poses (5.2)-(5.4), corrected."""
@@ -147,15 +133,6 @@ class RobotMovement(ReachingMovement):
             parameter = parameter + np.linalg.solve(jacobian, (target - reached)[..., None])[..., 0]
         return parameter
 
-    def opening(self, finger_to_thumb: ArrayLike) -> Floats:
-        """Normalised opening ξ of the gripper, [K], 1 open (after 5.24, corrected)."""
-        size = np.linalg.norm(np.asarray(finger_to_thumb, dtype=np.float64), axis=-1)
-        return np.asarray(np.clip((size - self.o_min) / (self.o_max - self.o_min), 0.0, 1.0))
-
-    def openings(self, states: ArmPoses) -> Floats:
-        """ξ in all states, as `opening`."""
-        return self.opening(states.finger_to_thumb)
-
     def within_training(self, target: ArrayLike) -> bool | None:
         """Whether the parameter of `target` [3] lies in the grid."""
         coordinates = self.grid.coordinates(self.parameter_for(self.reach_state, target))
@@ -178,6 +155,17 @@ class RobotMovement(ReachingMovement):
         indices, weights = self.grid.weights(self.grid.coordinates(parameters), clamped=False)
         means = self.means if state is None else self.means[:, state]
         return weights, np.asarray(means[indices])
+
+
+def grasp_states(description: MovementDescription, n_states: int) -> tuple[int, int]:
+    """States of arrival and of the beginning of the retreat, of a movement that grasps in between."""
+    arrival, grasp, last = description.arrival, description.grasp, n_states - 1
+    if not 0.0 < arrival < grasp < 1.0:
+        raise ValueError(
+            f"the model of {description.action!r} gives arrival {arrival} and grasp {grasp}; "
+            "a reaching action has 0 < arrival < grasp < 1, or arrival 1 if it ends at the target"
+        )
+    return round(arrival * last), round(grasp * last)
 
 
 def points_of(means: Floats, point_names: tuple[str, ...]) -> dict[str, Floats]:

@@ -11,11 +11,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import Delaunay, QhullError
 
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
-from paramove.motion.conversion import RobotMovement, arm_of, points_of
-from paramove.motion.reaching_movement import ArmPoses, ReachingMovement, TrainingTargets
+from paramove.motion.conversion import RobotMovement, arm_of, grasp_states, points_of
+from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.motion.timing import minimum_jerk
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParametricHMM
 
@@ -50,8 +51,10 @@ class ModelledMovement(ReachingMovement):
         self._farthest = _FARTHEST * arm_length
         self._returns = not ends_at_target(description)
         self.begins_above_table = not self._returns
-        self.reach_state, self.release_state = _arrival_states(description, model.n_states)
-        targets = _targets_of(model)
+        self.reach_state, self.release_state = (
+            grasp_states(description, model.n_states) if self._returns else (model.n_states - 1, model.n_states)
+        )
+        self._targets = targets = _targets_of(model)
         person = points_of(model.state_means(targets), self._names)
         elbow, gripper, across = arm_of(person, person["shoulder"])
         length = np.linalg.norm(elbow, axis=-1) + np.linalg.norm(gripper - elbow, axis=-1)
@@ -98,27 +101,28 @@ class ModelledMovement(ReachingMovement):
 
     def openings(self, states: ArmPoses) -> Floats:
         """ξ in all states: measured where the movement grasps, else opened on approach and closed on retreat."""
-        n = len(states)
         if self._returns:
-            size = np.linalg.norm(states.finger_to_thumb, axis=-1)
-            return np.asarray(np.clip((size - self.o_min) / (self.o_max - self.o_min), 0.0, 1.0))
-        there = minimum_jerk(np.clip(np.linspace(0.0, 1.0, n // 2) / WIDEST_AT, 0.0, 1.0))
+            return super().openings(states)
+        there = minimum_jerk(np.clip(np.linspace(0.0, 1.0, len(states) // 2) / WIDEST_AT, 0.0, 1.0))
         return np.concatenate([there, there[::-1]])
 
     def within_training(self, target: ArrayLike) -> bool | None:
         """Whether the parameter of `target` [3] lies in the hull of the training's; None in files without them."""
-        if self._hull is None:
+        if self._model.training_theta_ is None:
             return None
         try:
             parameter = self.parameter_for(self.reach_state, target)[0]
         except UnreachablePoseError:
             return False
-        return self._hull.enclose(parameter)
+        return self._hull is not None and bool(self._hull.find_simplex(parameter[None])[0] >= 0)
 
     @cached_property
-    def _hull(self) -> TrainingTargets | None:
-        theta = self._model.training_theta_
-        return None if theta is None else TrainingTargets((theta - self._shoulder) * self.scale)
+    def _hull(self) -> Delaunay | None:
+        """Convex hull of the targets, without a margin; None if nothing lies between them: too few, or in one plane."""
+        try:
+            return Delaunay((self._targets - self._shoulder) * self.scale)
+        except (QhullError, ValueError):
+            return None
 
     def _nearer(self, state: int, target: Floats, parameter: Floats, missed: Floats) -> tuple[Floats, Floats]:
         """One step of Newton's method, halved where it would not come nearer."""
@@ -179,19 +183,6 @@ def _targets_of(model: ParametricHMM) -> Floats:
     if targets.shape[1] != 3:
         raise ValueError(f"expected a model of 3 parameters, the position that is reached; found {targets.shape[1]}")
     return targets
-
-
-def _arrival_states(description: MovementDescription, n_states: int) -> tuple[int, int]:
-    """States of arrival and of the beginning of the retreat."""
-    arrival, grasp, last = description.arrival, description.grasp, n_states - 1
-    if ends_at_target(description):
-        return last, last + 1
-    if not 0.0 < arrival < grasp < 1.0:
-        raise ValueError(
-            f"the model of {description.action!r} gives arrival {arrival} and grasp {grasp}; "
-            "a reaching action has 0 < arrival < grasp < 1, or arrival 1 if it ends at the target"
-        )
-    return round(arrival * last), round(grasp * last)
 
 
 def robot_movement(model: ParametricHMM, arm_length: float) -> ReachingMovement:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import Delaunay, QhullError
 
 from paramove.documents import Floats
 
@@ -56,7 +55,7 @@ class ReachingMovement(ABC):
 
     Attributes:
         scale: s = l / l′.
-        o_max: Maximum distance of finger and thumb, m.
+        o_min, o_max: Minimum and maximum distance of finger and thumb after scaling, m.
         reach_state: State in which the gripper is at the target, still open (T of 5.2.5).
         release_state: State in which the hand begins to go back (T′).
         begins_above_table: Whether the hand comes from above the table, as that of people who sit at it; otherwise it
@@ -64,6 +63,7 @@ class ReachingMovement(ABC):
     """
 
     scale: float
+    o_min: float
     o_max: float
     reach_state: int
     release_state: int
@@ -87,15 +87,16 @@ class ReachingMovement(ABC):
         """Parameters [K, 3] for which the gripper in `state` is at the given points [K, 3] (thesis 5.1, 1b)."""
 
     @abstractmethod
-    def openings(self, states: ArmPoses) -> Floats:
-        """Normalised openings ξ of the gripper, 1 open, in all states [N, 9] of one movement, [N]."""
-
-    @abstractmethod
     def within_training(self, target: ArrayLike) -> bool | None:
         """Whether the gripper is at `target` [3] in a movement between the demonstrated ones; None if unknown.
 
         Between: the parameter lies in the convex hull of the targets of the training.
         """
+
+    def openings(self, states: ArmPoses) -> Floats:
+        """Normalised openings ξ of the gripper, 1 open, in the states of a movement, [N] (after 5.24, corrected)."""
+        size = np.linalg.norm(states.finger_to_thumb, axis=-1)
+        return np.asarray(np.clip((size - self.o_min) / (self.o_max - self.o_min), 0.0, 1.0))
 
     def approach(self, target: ArrayLike) -> tuple[ArmPoses, Floats]:
         """States 1..T of the movement that brings the gripper to `target` [3], and the openings."""
@@ -107,21 +108,3 @@ class ReachingMovement(ABC):
         """States T′..N of the movement that leaves `target` [3], and the openings."""
         poses = self.poses(self.parameter_for(self.release_state, target)[0])
         return poses[self.release_state :], self.openings(poses)[self.release_state :]
-
-
-class TrainingTargets:
-    """The targets of the training as a body: their convex hull, without a margin.
-
-    Args:
-        targets: [K, P].
-    """
-
-    def __init__(self, targets: Floats) -> None:
-        try:
-            self._hull: Delaunay | None = Delaunay(targets)
-        except (QhullError, ValueError):
-            self._hull = None  # too few targets, or all in one plane: nothing lies between them
-
-    def enclose(self, parameter: Floats) -> bool:
-        """Whether a parameter [P] lies in the hull."""
-        return self._hull is not None and bool(self._hull.find_simplex(parameter[None])[0] >= 0)
