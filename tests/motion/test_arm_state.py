@@ -48,7 +48,8 @@ def test_finds_the_pose_at_rest_and_at_the_base_pose_at_once(robot) -> None:
     np.testing.assert_allclose(state.pose.gripper, arm.position(away(arm)), rtol=0, atol=1e-12)
     state, now_ns = after(arm, arm.base_angles[None])
     assert state.estimate_pose(now_ns)
-    assert state.at_base
+    assert state.known
+    assert state.pose is None
 
 
 @each_robot

@@ -131,7 +131,7 @@ class ArmPoseSolver:
 
     def outside_limits(self, angles: Floats) -> Floats:
         """By how much each joint of angles [K, 5] lies outside the limits that `solve` keeps, rad; 0 inside."""
-        return np.asarray(np.clip(np.maximum(self._lower - angles, angles - self._upper), 0.0, None))
+        return np.asarray(np.clip(self._beyond(angles), 0.0, None))
 
     def pressed_inside(self, angles: Floats) -> Floats:
         """A curve [K, 5] through solved poses with what overshoots their limits pressed into the margin beyond them.
@@ -213,10 +213,13 @@ class ArmPoseSolver:
 
     def _excess(self, angles: Floats) -> Floats:
         """How far the worst joint lies outside its limits, rad; not positive inside."""
-        return np.asarray(np.maximum(self._lower - angles, angles - self._upper).max(axis=-1))
+        return np.asarray(self._beyond(angles).max(axis=-1))
+
+    def _beyond(self, angles: Floats) -> Floats:
+        return np.asarray(np.maximum(self._lower - angles, angles - self._upper))
 
     def _broken(self, angles: Floats) -> str:
-        worst = int(np.argmax(np.maximum(self._lower - angles, angles - self._upper)))
+        worst = int(np.argmax(self._beyond(angles)))
         low, high, angle = np.rad2deg([self._lower[worst], self._upper[worst], angles[worst]])
         return f"the limit of {self._joints[worst]} ({angle:.1f} deg, allowed {low:.1f} to {high:.1f})"
 

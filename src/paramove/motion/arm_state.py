@@ -51,11 +51,6 @@ class ArmState:
         self.missing: tuple[str, ...] = ()
 
     @property
-    def at_base(self) -> bool:
-        """Whether the arm is known to be at its base pose."""
-        return self.known and self.pose is None
-
-    @property
     def felt(self) -> str:
         """What was measured where nothing was felt, and what would count as something."""
         return f"the gripper stopped at an opening of {self.measured:.3f}, felt_opening is {self._arm.felt_opening:g}"

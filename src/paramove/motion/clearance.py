@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from paramove.documents import Floats, Ints
 from paramove.motion.gripper_arm import GripperArm
-from paramove.motion.model_check import check_model
+from paramove.motion.model_check import check_model, qpos_addresses
 from paramove.motion.plans import MAX_STANDING, check_number
 from paramove.robots import DescriptionError, RobotDescription
 
@@ -81,8 +81,8 @@ class ClearanceChecker:
             raise DescriptionError(f"{robot.model_path} does not fit the robot's description: {error}") from error
         check_model(robot, arm, model)
         self._data = data = mujoco.MjData(model)
-        data.qpos[[int(model.joint(name).qposadr[0]) for name in robot.joint_names]] = robot.base_pose
-        self._qpos = [int(model.joint(name).qposadr[0]) for name in arm.joints]
+        data.qpos[qpos_addresses(model, robot.joint_names)] = robot.base_pose
+        self._qpos = qpos_addresses(model, arm.joints)
         self._tip = model.site(arm.tip_site).id
         mujoco.mj_kinematics(model, data)
         self._base = np.array(data.site(arm.base_site).xpos)

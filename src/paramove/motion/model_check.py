@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import mujoco
 import numpy as np
 
@@ -33,8 +35,8 @@ def check_model(robot: RobotDescription, arm: GripperArm, model: mujoco.MjModel)
     indices = robot.indices(arm.joints)
     _check_ranges(robot, indices, model)
     data = mujoco.MjData(model)
-    data.qpos[[int(model.joint(name).qposadr[0]) for name in robot.joint_names]] = robot.base_pose
-    qpos = [int(model.joint(name).qposadr[0]) for name in arm.joints]
+    data.qpos[qpos_addresses(model, robot.joint_names)] = robot.base_pose
+    qpos = qpos_addresses(model, arm.joints)
     draw = np.random.default_rng(0)
     for angles in draw.uniform(robot.lower[indices], robot.upper[indices], size=(N_POSES, len(indices))):
         data.qpos[qpos] = angles
@@ -48,6 +50,11 @@ def check_model(robot: RobotDescription, arm: GripperArm, model: mujoco.MjModel)
                 f"{arm.base_site} with the joints at {_whole(np.rad2deg(angles[:-1]))} deg, in {robot.model_path.name} "
                 f"{arm.tip_site} is at {_whole(1000 * in_model)} mm: make them agree"
             )
+
+
+def qpos_addresses(model: mujoco.MjModel, joints: Iterable[str]) -> list[int]:
+    """Where the positions of these joints stand in `qpos`."""
+    return [int(model.joint(name).qposadr[0]) for name in joints]
 
 
 def _check_ranges(robot: RobotDescription, indices: Ints, model: mujoco.MjModel) -> None:

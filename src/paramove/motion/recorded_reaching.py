@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from paramove.phmm import ModelFileError, MovementDescription, PolynomialPHMM, s
 from paramove.source_code import code_digest
 
 ACTIONS = ("reach_forward", "reach_across")
+"""Of the recorded people, pooled."""
 N_STATES = 40
 REMEDY = (
     "put the data set next to the clone as ../shared/data/table_reach/data.npz or name its folder in PARAMOVE_DATA; or "
@@ -37,7 +37,7 @@ def people_model(name: str, cache_folder: Path | None) -> PolynomialPHMM:
         source = f"{name}, {', '.join(ACTIONS)}, sha256 {_digest(name)}, {code}"
         if cached is not None and trained_from == source:
             return cached
-        model = train_people_model(load_recordings(name), actions=ACTIONS, n_states=N_STATES)
+        model = train_people_model(load_recordings(name))
     except RecordingsError as error:
         if cached is not None and trained_from.endswith(code):
             return cached
@@ -59,29 +59,23 @@ def _digest(name: str) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()[:16]
 
 
-def train_people_model(
-    recordings: Recordings, *, degree: int = 1, actions: Sequence[str] = ACTIONS, n_states: int = N_STATES
-) -> PolynomialPHMM:
-    """A polynomial model of reaching over the touched position, in the body frame of one person, m.
+def train_people_model(recordings: Recordings, n_states: int = N_STATES) -> PolynomialPHMM:
+    """A linear model of reaching over the touched position, in the body frame of one person, m.
 
     The movements end where the hand arrives: arrival is 1, there is no grasp and no retreat.
 
     Args:
         recordings: Of people that reach for positions, each movement labelled with its target.
-        degree: 1 linear, 2 quadratic.
-        actions: Which of their actions, pooled.
         n_states: Each of 2 or 3 of `2.5 * n_states` frames.
 
     Raises:
         ValueError: An action is not among the recorded ones.
     """
-    unknown = sorted(set(actions) - set(recordings.actions))
-    if unknown or not actions:
+    unknown = sorted(set(ACTIONS) - set(recordings.actions))
+    if unknown:
         raise ValueError(f"{recordings.name} has the actions {', '.join(recordings.actions)}; found {unknown}")
-    chosen = [one for action in actions for one in recordings.of(action=action) if np.isfinite(one.target).all()]
-    model = PolynomialPHMM(
-        n_states, 2, 3, degree=degree, resampled_frames=round(2.5 * n_states), residuals="independent"
-    )
+    chosen = [one for action in ACTIONS for one in recordings.of(action=action) if np.isfinite(one.target).all()]
+    model = PolynomialPHMM(n_states, 2, 3, degree=1, resampled_frames=round(2.5 * n_states), residuals="independent")
     theta = np.stack([one.target for one in chosen])
     groups = np.array([one.subject for one in chosen])
     model.fit([one.movement for one in chosen], theta, groups=groups)

@@ -37,13 +37,8 @@ class SynthesizerOutput:
     statuses: tuple[RelocationStatus, ...]
 
 
-@dataclass(frozen=True)
-class _Outcome:
-    done: bool
-    reason: str = ""
-
-
-_Course = Generator[PlannedMotion, None, _Outcome]
+_Course = Generator[PlannedMotion, None, str]
+"""Yields a motion, is resumed when it has been executed, and returns why the goal has failed; empty if it succeeded."""
 
 
 class _Hulls(NamedTuple):
@@ -199,7 +194,7 @@ class Synthesizer:
             if self._running is None:
                 self._hand.forget()
 
-    # The courses of the goals. Each yields a motion, is resumed when it has been executed, and returns the outcome.
+    # The courses of the goals
 
     def _fetch(self, goal: RelocationGoal, then: Callable[[RestPose, Floats, Floats], PlannedMotion]) -> _Course:
         source, target, standing = point_of(goal, "from"), point_of(goal, "to"), standing_of(goal)
@@ -212,27 +207,27 @@ class Synthesizer:
         if not self.holding:
             felt = self._hand.felt
             yield self._plans.leave(fetch.end, self._hand.opening, standing)
-            return _Outcome(False, f"felt nothing in the hand at {centimetres(source)} cm: {felt}")
+            return f"felt nothing in the hand at {centimetres(source)} cm: {felt}"
         yield onwards
         return self._placed(target)
 
     def _offer_hand(self, goal: RelocationGoal) -> _Course:
         yield self._plans.reach(point_of(goal, "from"), standing_of(goal), self._start_of(goal))
-        return _Outcome(True)
+        return ""
 
     def _take(self, goal: RelocationGoal) -> _Course:
         here, plans = self._waits_at(), self._plans
         yield plans.fingers(here, self._hand.opening, plans.closed_opening, standing_of(goal))
         if self.holding:
-            return _Outcome(True)
+            return ""
         felt = self._hand.felt
         yield plans.fingers(here, self._hand.opening, plans.offer_opening, standing_of(goal))
-        return _Outcome(False, f"closed the hand and felt nothing: {felt}")
+        return f"closed the hand and felt nothing: {felt}"
 
     def _release(self, goal: RelocationGoal) -> _Course:
         opening = self._plans.offer_opening
         yield self._plans.fingers(self._waits_at(), self._hand.opening, opening, standing_of(goal))
-        return _Outcome(True)
+        return ""
 
     def _place_held(self, goal: RelocationGoal) -> _Course:
         target = point_of(goal, "to")
@@ -244,12 +239,12 @@ class Synthesizer:
     def _rest(self, goal: RelocationGoal) -> _Course:
         if self._hand.pose is not None:
             yield self._plans.home(self._hand.pose, self._hand.opening, self.holding, standing_of(goal))
-        return _Outcome(True)
+        return ""
 
-    def _placed(self, target: Floats) -> _Outcome:
+    def _placed(self, target: Floats) -> str:
         if self._hand.lost:
-            return _Outcome(False, f"the object slipped out of the hand on the way to {centimetres(target)} cm")
-        return _Outcome(True)
+            return f"the object slipped out of the hand on the way to {centimetres(target)} cm"
+        return ""
 
     def _begin_or_reject(self, goal: RelocationGoal) -> None:
         if self._running is None:
@@ -284,12 +279,12 @@ class Synthesizer:
         self._report(goal.id, RelocationStatus.STATE_ACCEPTED)
         self._start_or_end(running, first)
 
-    def _advance(self, running: _Running) -> PlannedMotion | _Outcome:
+    def _advance(self, running: _Running) -> PlannedMotion | str:
+        """The next motion of its course, or how that has ended."""
         try:
             return next(running.course)
         except StopIteration as end:
-            outcome: _Outcome = end.value
-            return outcome
+            return str(end.value)
 
     def _next_motion(self, running: _Running) -> None:
         assert running.motion is not None
@@ -297,10 +292,10 @@ class Synthesizer:
         try:
             self._start_or_end(running, self._advance(running))
         except _NO_PLAN as error:
-            self._end(running, _Outcome(False, str(error)))
+            self._end(running, str(error))
 
-    def _start_or_end(self, running: _Running, step: PlannedMotion | _Outcome) -> None:
-        if isinstance(step, _Outcome):
+    def _start_or_end(self, running: _Running, step: PlannedMotion | str) -> None:
+        if isinstance(step, str):
             self._end(running, step)
             return
         running.motions += 1
@@ -314,13 +309,13 @@ class Synthesizer:
     def _stopped(self, running: _Running, reason: str) -> None:
         """The motion ended at an unknown pose."""
         self._hand.forget()
-        self._end(running, _Outcome(False, reason))
+        self._end(running, reason)
 
-    def _end(self, running: _Running, outcome: _Outcome) -> None:
+    def _end(self, running: _Running, failure: str) -> None:
         running.course.close()
         self._running = None
-        state = RelocationStatus.STATE_SUCCEEDED if outcome.done else RelocationStatus.STATE_FAILED
-        self._report(running.goal.id, state, running.phase, outcome.reason, running.elbow_turn)
+        state = RelocationStatus.STATE_FAILED if failure else RelocationStatus.STATE_SUCCEEDED
+        self._report(running.goal.id, state, running.phase, failure, running.elbow_turn)
 
     def _report_phase(self, running: _Running) -> None:
         assert running.motion is not None
