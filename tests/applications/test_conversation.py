@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from paramove.applications.conversation import GoalClient, Goals, OutgoingMessages
+from paramove.applications.conversation import GoalClient, OutgoingMessages
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.objects.object_shape import ObjectShape
 
@@ -18,7 +18,7 @@ def _sent(client: GoalClient, name: str, attempt: int, state: RelocationStatus.S
 
 
 def test_an_object_is_grasped_first_in_the_way_that_worked_last() -> None:
-    client = GoalClient(Goals("arm_base", 0.036), "run")
+    client = GoalClient("arm_base", 0.036, "run")
     failed, succeeded = RelocationStatus.STATE_FAILED, RelocationStatus.STATE_SUCCEEDED
     assert [_sent(client, "cube", 1, failed), _sent(client, "cube", 2, succeeded)] == [1, 2]
     assert [_sent(client, "cube", 1, succeeded), _sent(client, "cube", 2, failed)] == [2, 3]

@@ -101,7 +101,7 @@ def test_stages_have_the_states_that_are_told():
     """Each state of the table occurs in the stage's file, and the file goes to no other."""
     for _, path, states, _ in table(ARCHITECTURE, "stages"):
         source = (ROOT / "src" / "paramove" / path).read_text(encoding="utf-8")
-        assert set(re.findall(r'self\.go\("(\w+)"\)', source)) == set(states.split(", "))
+        assert set(re.findall(r'self\.app\.go\("(\w+)"\)', source)) == set(states.split(", "))
 
 
 def test_every_key_of_a_servo_arm_is_in_the_page_that_adds_one():

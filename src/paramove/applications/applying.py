@@ -57,12 +57,12 @@ class Applying(Stage):
         """Store the target while waiting for one."""
         if gesture.kind in AT_REST:
             self._stood.add(gesture.object)
-        if gesture.kind != Gesture.KIND_POINTED_AT or self.state != "waiting":
+        if gesture.kind != Gesture.KIND_POINTED_AT or self.app.state != "waiting":
             return
         if self.app.options.pointing == "nearness":
             if gesture.object or not gesture.located:
                 self._pointed_at(gesture.object)
-        elif not gesture.object and gesture.captured.ToNanoseconds() * 1e-9 > self.app.now_s - self.for_s:
+        elif not gesture.object and gesture.captured.ToNanoseconds() * 1e-9 > self.app.now_s - self.app.for_s:
             self._pointed_at_position(gesture)
 
     def step(self) -> ApplicationStage.Stage | None:
@@ -75,11 +75,11 @@ class Applying(Stage):
             "looking": self._looking,
             "helped": self._helped,
         }
-        return steps[self.state]()
+        return steps[self.app.state]()
 
     def _ask(self) -> None:
         self.app.speak("Please point at the object that I shall put away.", Speech.REQUEST_POINT_AT_OBJECT)
-        self.go("waiting")
+        self.app.go("waiting")
 
     def _waiting(self) -> ApplicationStage.Stage | None:
         for name in sorted(self._stood - self.app.done):
@@ -90,7 +90,7 @@ class Applying(Stage):
         if twins - self._told_twins:
             self._ask_to_leave_one(min(twins - self._told_twins))
         self._told_twins &= twins
-        if self.for_s > self.app.options.ask_again_s:
+        if self.app.for_s > self.app.options.ask_again_s:
             self._ask()
         return None
 
@@ -112,13 +112,13 @@ class Applying(Stage):
             self._ask_to_leave_one(name)
             return
         self.app.speak(f"You point at {name} at {cm(place)}: it belongs to the opening at {cm(self.app.rules[name])}.")
-        self.go("letting_hand_leave")
+        self.app.go("letting_hand_leave")
 
     def _ask_to_leave_one(self, name: str) -> None:
         self._object = name
         self._told_twins.add(name)
         self._ask_for_help(f"I see more than one {name} object.", please="Please leave one of them, and point again")
-        self.go("waiting")  # the one that is left may not move
+        self.app.go("waiting")  # the one that is left may not move
 
     def _pointed_at_position(self, gesture: Gesture) -> None:
         """Take the object at rest there. Targets off the table, or while objects are being arranged, are ignored."""
@@ -134,7 +134,7 @@ class Applying(Stage):
             self._pointed_at(result.name)
         elif app.options.surface.contains((gesture.x, gesture.y)) and set(app.rules) - app.done <= set(settled):
             app.speak(f"{result.doubt} Please point again.", Speech.REQUEST_POINT_AT_OBJECT)
-            self.go("waiting")
+            self.app.go("waiting")
 
     def _letting_hand_leave(self) -> None:
         if self.hand_has_left(HAND_AWAY_S):
@@ -154,13 +154,13 @@ class Applying(Stage):
             RelocationGoal.KIND_RELOCATE,
             app.now_s,
             self._object,
-            source=app.goals.position(self._source),
-            target=app.goals.position(app.rules[self._object]),
+            source=app.goal_client.position(self._source),
+            target=app.goal_client.position(app.rules[self._object]),
             avoid=standing.values(),
             attempt=self._attempt,
             shape=shape,
         )
-        self.go("relocating")
+        self.app.go("relocating")
 
     def _relocating(self) -> None:
         outcome = self.app.goal_client.outcome
@@ -171,9 +171,9 @@ class Applying(Stage):
         elif outcome.state == RelocationStatus.STATE_FAILED:
             self._failure = outcome.reason or "it failed"
             self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
-            self.go("returning")
+            self.app.go("returning")
         else:
-            self.go("looking")
+            self.app.go("looking")
 
     def _rejected(self, outcome: RelocationStatus) -> None:
         """No path around a standing object: that one first. Ask for help only if each blocks the other.
@@ -190,7 +190,7 @@ class Applying(Stage):
         if other:
             detail = f"{other} stands in the way of {self._object}. Please point at {other} first."
             self.app.speak(detail, Speech.REQUEST_POINT_AT_OBJECT, other)
-            self.go("waiting")
+            self.app.go("waiting")
         else:
             to_move = next((name for name in (self._object, *in_the_way) if name not in self._moved), "")
             if not to_move:  # all were moved once
@@ -201,21 +201,21 @@ class Applying(Stage):
     def _returning(self) -> None:
         """The arm may have been left anywhere: bring it to its base pose before looking."""
         if self.app.goal_client.outcome is not None:
-            self.go("looking")
+            self.app.go("looking")
 
     def _looking(self) -> ApplicationStage.Stage | None:
         """The arm has left: is the object gone, or does it stand or lie somewhere?"""
-        if self.for_s < self.app.options.settle_s:
+        if self.app.for_s < self.app.options.settle_s:
             return None
         sighting = self.app.table.objects.get(self._object)
         if not self._failure and sighting is not None and sighting.kind == Gesture.KIND_VANISHED:
             return self._put_away()
         if sighting is not None and sighting.at_rest and sighting.position is not None:
             outdated = not self._failure and sighting.time_s < self._began_s
-            if outdated and self.for_s < 2 * self.app.options.settle_s:
+            if outdated and self.app.for_s < 2 * self.app.options.settle_s:
                 return None  # not detected since: the view is not settled yet
             return self._try_again(sighting.position)
-        if self.for_s > 3 * self.app.options.settle_s:
+        if self.app.for_s > 3 * self.app.options.settle_s:
             return self._tried_in_vain(f"I have lost sight of {self._object}.")
         return None
 
@@ -251,15 +251,15 @@ class Applying(Stage):
         what = "it" if self._to_move == self._object else self._to_move
         please = please or f"Please put {what} to another place"
         self.app.speak(f"{detail} {please}.", Speech.REQUEST_HELP, self._to_move)
-        self.go("helped")
+        self.app.go("helped")
 
     def _helped(self) -> None:
         sighting = self.app.table.objects.get(self._to_move)
-        came = sighting is not None and sighting.at_rest and sighting.time_s > self.app.now_s - self.for_s
+        came = sighting is not None and sighting.at_rest and sighting.time_s > self.app.now_s - self.app.for_s
         if came and self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S:
             self._stuck.clear()
             self._ask()
-        elif self.for_s > self.app.options.ask_again_s:
+        elif self.app.for_s > self.app.options.ask_again_s:
             self._ask_for_help(f"I still need help with {self._to_move}.", self._to_move)
 
     def _put_away(self) -> ApplicationStage.Stage | None:

@@ -35,7 +35,7 @@ class Calibrating(Stage):
         """Bring the arm to its base pose."""
         self.app.speak("I do not know yet how the camera sees the table. I will place an object at four corners.")
         self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
-        self.go("resting")
+        self.app.go("resting")
 
     def on_gesture(self, gesture: Gesture) -> None:
         """Nothing: the sightings stored by the table suffice."""
@@ -53,7 +53,7 @@ class Calibrating(Stage):
             "looking": self._looking,
             "helped": self._helped,
         }
-        return steps[self.state]()
+        return steps[self.app.state]()
 
     @property
     def _corner(self) -> Place:
@@ -68,7 +68,7 @@ class Calibrating(Stage):
     def _ask_to_stand(self, start: Place) -> None:
         detail = f"Please stand an object at {cm(start)} and take your hand away."
         self.app.speak(detail, Speech.REQUEST_STAND_OBJECT_AT_START)
-        self.go("asking_to_stand")
+        self.app.go("asking_to_stand")
 
     def _asking_to_stand(self) -> None:
         start = self.app.options.start
@@ -76,12 +76,12 @@ class Calibrating(Stage):
         self._held = self._came_to_rest()
         if self._held and self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S:
             self._relocate(start)
-        elif self.for_s > self.app.options.ask_again_s:
+        elif self.app.for_s > self.app.options.ask_again_s:
             self._ask_to_stand(start)
 
     def _came_to_rest(self) -> str:
         """The object that came to rest last since this state began, and has not moved for a while; "" if none."""
-        since = self.app.now_s - self.for_s
+        since = self.app.now_s - self.app.for_s
         still = {
             sighting.time_s: name
             for name, sighting in self.app.table.objects.items()
@@ -93,7 +93,7 @@ class Calibrating(Stage):
         assert self.app.options.offer is not None  # else there is a start
         x, y, z = self.app.options.offer
         self.app.goal_client.start(RelocationGoal.KIND_OFFER_HAND, self.app.now_s, source=Position(x=x, y=y, z=z))
-        self.go("offering")
+        self.app.go("offering")
 
     def _offering(self) -> None:
         outcome = self.app.goal_client.outcome
@@ -103,48 +103,48 @@ class Calibrating(Stage):
             self._ask_for_help(f"I cannot hold my hand out: {outcome.reason}")
         elif outcome is not None:
             self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
-            self.go("resting")
+            self.app.go("resting")
 
     def _ask_for_help(self, detail: str) -> None:
         """The same goal would be rejected again: only a person can change that."""
         self.app.speak(f"{detail}. Please help me; I try again in a while.", Speech.REQUEST_HELP, self._held)
-        self.go("helped")
+        self.app.go("helped")
 
     def _helped(self) -> None:
-        if self.for_s > self.app.options.ask_again_s:
+        if self.app.for_s > self.app.options.ask_again_s:
             self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
-            self.go("resting")
+            self.app.go("resting")
 
     def _ask(self) -> None:
         self.app.speak("Please put an object into my hand and hold it there.", Speech.REQUEST_HAND_ME_AN_OBJECT)
-        self.go("asking")
+        self.app.go("asking")
 
     def _asking(self) -> None:
         held = self._came_to_rest()
         if held:
             self._held = held
             self.app.goal_client.start(RelocationGoal.KIND_TAKE, self.app.now_s, self._held)
-            self.go("taking")
-        elif self.for_s > self.app.options.ask_again_s:
+            self.app.go("taking")
+        elif self.app.for_s > self.app.options.ask_again_s:
             self._ask()
 
     def _taking(self) -> None:
         if self.app.goal_client.succeeded:
             self.app.speak(f"I have {self._held}. Please let go.", Speech.REQUEST_LET_GO)
-            self.go("letting_go")
+            self.app.go("letting_go")
         elif self.app.goal_client.outcome is not None:
             self._ask()
 
     def _letting_go(self) -> None:
-        if self.hand_has_left(HAND_AWAY_S) and self.for_s > 1.0:
-            target = self.app.goals.position(self._corner)
+        if self.hand_has_left(HAND_AWAY_S) and self.app.for_s > 1.0:
+            target = self.app.goal_client.position(self._corner)
             self.app.goal_client.start(RelocationGoal.KIND_PLACE_HELD, self.app.now_s, self._held, target=target)
-            self.go("placing")
+            self.app.go("placing")
 
     def _placing(self) -> None:
         outcome = self.app.goal_client.outcome
         if self.app.goal_client.succeeded:
-            self.go("looking")
+            self.app.go("looking")
         elif outcome is not None and outcome.state == RelocationStatus.STATE_REJECTED:
             self._ask_for_help(f"I cannot put {self._held} at {cm(self._corner)}: {outcome.reason}")
         elif outcome is not None:
@@ -154,17 +154,17 @@ class Calibrating(Stage):
         self._missed += 1
         self.app.speak(f"That did not work: {reason}.")
         self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
-        self.go("resting")
+        self.app.go("resting")
 
     def _looking(self) -> ApplicationStage.Stage | None:
         """The arm has left: wait for a clear view of the object."""
         sighting = self.app.table.objects.get(self._held)
-        if self.for_s < self.app.options.settle_s:
+        if self.app.for_s < self.app.options.settle_s:
             return None
         if sighting is not None and sighting.at_rest and sighting.time_s > self.app.goal_client.started_s:
             self._observations.append((self._corner, sighting))
             return self._next_corner()
-        if self.for_s > 2 * self.app.options.settle_s:
+        if self.app.for_s > 2 * self.app.options.settle_s:
             self._start_again(f"I do not see {self._held} at {cm(self._corner)}")
         return None
 
@@ -175,11 +175,11 @@ class Calibrating(Stage):
         return None
 
     def _relocate(self, source: Place) -> None:
-        goals, attempt = self.app.goals, 1 + self._missed
-        ends = goals.position(source), goals.position(self._corner)
-        self.app.goal_client.start(RelocationGoal.KIND_RELOCATE, self.app.now_s, self._held, *ends, attempt=attempt)
+        client, attempt = self.app.goal_client, 1 + self._missed
+        ends = client.position(source), client.position(self._corner)
+        client.start(RelocationGoal.KIND_RELOCATE, self.app.now_s, self._held, *ends, attempt=attempt)
         self._missed = 0
-        self.go("placing")
+        self.app.go("placing")
 
     def _finish(self) -> ApplicationStage.Stage | None:
         image = [(sighting.u_px, sighting.v_px) for _, sighting in self._observations]

@@ -26,17 +26,11 @@ class OutgoingMessages:
     rules: list[Rules] = field(default_factory=list)
     stages: list[ApplicationStage] = field(default_factory=list)
 
-
-@dataclass(frozen=True)
-class Goals:
-    """Where goals take place: the frame of positions and the height at which objects are grasped, m."""
-
-    frame: str
-    grasp_z: float
-
-    def position(self, place: tuple[float, float], above: float = 0.0) -> Position:
-        """A position on the working plane as a position of the gripper."""
-        return Position(x=place[0], y=place[1], z=self.grasp_z + above)
+    def speak(self, now_s: float, text: str, request: Speech.Request, name: str = "") -> None:
+        """Say something to the person, with or without a request, about the object of this name or about none."""
+        speech = Speech(request=request, object=name, text=text)
+        speech.captured.FromNanoseconds(round(now_s * 1e9))
+        self.speech.append(speech)
 
 
 class GoalClient:
@@ -44,13 +38,18 @@ class GoalClient:
 
     The node that executes goals may have been restarted and not know the goal: it reports that, and the goal fails.
 
+    Args:
+        frame: Of all positions.
+        grasp_z: Height at which standing objects are grasped, m.
+        run_name: Prefix of the goals' ids; unique to the process, as a goal id is executed only once.
+
     Attributes:
         grasps: How many times an object was to be grasped.
         retries: How many of them were not the first try.
     """
 
-    def __init__(self, goals: Goals, run_name: str) -> None:
-        self._goals, self._run_name = goals, run_name
+    def __init__(self, frame: str, grasp_z: float, run_name: str) -> None:
+        self._frame, self._grasp_z, self._run_name = frame, grasp_z, run_name
         self._count = 0
         self._goal: RelocationGoal | None = None
         self._status: RelocationStatus | None = None
@@ -62,6 +61,10 @@ class GoalClient:
         self.retries = 0
         self._worked: dict[str, int] = {}
         self._skipped = 0
+
+    def position(self, place: tuple[float, float]) -> Position:
+        """A position on the working plane as a position of the gripper."""
+        return Position(x=place[0], y=place[1], z=self._grasp_z)
 
     def start(
         self,
@@ -86,10 +89,10 @@ class GoalClient:
             id=f"{self._run_name}-{self._count}",
             kind=kind,
             object=name,
-            frame=self._goals.frame,
+            frame=self._frame,
             attempt=attempt + self._skipped,
+            plan_only=plan_only,
         )
-        goal.plan_only = plan_only
         if shape is not None:
             goal.object_width_m, goal.object_height_m, goal.object_length_m = shape.width, shape.height, shape.length
             if shape.turn is not None:
@@ -98,7 +101,7 @@ class GoalClient:
             getattr(goal, "from").CopyFrom(source)
         if target is not None:
             goal.to.CopyFrom(target)
-        goal.avoid.extend(self._goals.position(place) for place in avoid)
+        goal.avoid.extend(self.position(place) for place in avoid)
         self._goal, self._status, self._sent_s, self.started_s = goal, None, float("-inf"), now_s
         self._received_s = now_s
         if kind in (RelocationGoal.KIND_RELOCATE, RelocationGoal.KIND_FETCH) and not plan_only:

@@ -29,7 +29,7 @@ class Learning(Stage):
     def enter(self) -> None:
         """Ask for the rules."""
         self.app.speak("Please show me into which opening each object belongs.", Speech.REQUEST_SHOW_RULES)
-        self.go("watching")
+        self.app.go("watching")
         self._last_event_s = self.app.now_s
 
     def on_gesture(self, gesture: Gesture) -> None:
@@ -62,7 +62,7 @@ class Learning(Stage):
         if not missing:
             self.app.speak("I know all the rules now.")
             return ApplicationStage.STAGE_APPLY
-        quiet_s = self.app.now_s - max(self._last_event_s, self.app.now_s - self.for_s)
+        quiet_s = self.app.now_s - max(self._last_event_s, self.app.now_s - self.app.for_s)
         if quiet_s > self.app.options.ask_again_s:
             self._ask_again(missing[0])
         return None
@@ -92,4 +92,4 @@ class Learning(Stage):
         self.app.speak(
             f"I did not see where {name} belongs. Please show me again.", Speech.REQUEST_SHOW_RULE_AGAIN, name
         )
-        self.go("watching")
+        self.app.go("watching")

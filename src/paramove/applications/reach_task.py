@@ -9,8 +9,8 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, model_validator
 
-from paramove.applications.arm_watch import ArmWatch
-from paramove.applications.conversation import GoalClient, Goals, OutgoingMessages
+from paramove.applications.application import ArmWatch
+from paramove.applications.conversation import GoalClient, OutgoingMessages
 from paramove.documents import InputError
 from paramove.motion import FARTHEST_M, metres
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
@@ -92,7 +92,7 @@ class ReachTask:
         if not steps:
             raise InputError("no tasks: expected a list such as [{reach: [0.2, 0.0, 0.1]}], found none")
         self._steps = tuple(steps)
-        self._client = GoalClient(Goals(ARM_BASE, 0.0), run_name)
+        self._client = GoalClient(ARM_BASE, 0.0, run_name)
         self._watch = ArmWatch(0.0)
         self._armed = self._planned = self._started = False
         self._done = 0
@@ -178,9 +178,7 @@ class ReachTask:
         self._speak(self.failure, Speech.REQUEST_HELP)
 
     def _speak(self, detail: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
-        speech = Speech(request=request, text=detail)
-        speech.captured.FromNanoseconds(round(self._now_s * 1e9))
-        self._output.speech.append(speech)
+        self._output.speak(self._now_s, detail, request)
         self.detail = detail
         _log.info("%.1f s: %s", self._now_s, detail)
 

@@ -6,27 +6,21 @@ own last placement.
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
 
-from paramove.applications.arm_watch import ArmWatch
-from paramove.applications.conversation import GoalClient, Goals, OutgoingMessages
+from paramove.applications.application import Application
 from paramove.applications.options import Place, RelocatorOptions
 from paramove.applications.stage import cm
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
-from paramove.msgs.safety_state_pb2 import SafetyState
 
 NO_ESTIMATE_S = 1.0
-_log = logging.getLogger(__name__)
-
-STAGE_PERIOD_S = 1.0
 
 
-class Relocator:
+class Relocator(Application):
     """Pass received messages to the `on_…` methods, then call `tick`.
 
     States: resting, aligning (waiting for the object to be pointed at), fetching, waiting (for a target),
@@ -37,20 +31,14 @@ class Relocator:
         run_name: Prefix of the goals' ids; unique to the process, as a goal id is executed only once.
 
     Attributes:
-        state: Name of the state.
-        detail: Text of the last speech message.
         placed: Positions at which the object was put.
     """
 
     def __init__(self, options: RelocatorOptions, run_name: str) -> None:
+        super().__init__(options, run_name)
+        self.stage = ApplicationStage.STAGE_APPLY
         self._options = options
-        self._goals = Goals(options.frame, options.grasp_z)
-        self._goal_client = GoalClient(self._goals, run_name)
-        self._watch = ArmWatch(options.arming_timeout_s)
         self._sight = ArmSight(options.frame)
-        self._outgoing = OutgoingMessages()
-        self._now_s = 0.0
-        self._since_s = 0.0
         self._quiet_since_s = 0.0
         self._reported: set[str] = set()
         self._object_at = options.start
@@ -58,9 +46,6 @@ class Relocator:
         self._offset: Place | None = None if options.aligns else (0.0, 0.0)
         self._holding = False
         self._missed = 0
-        self._last_stage = ("", float("-inf"))
-        self.state = ""
-        self.detail = ""
         self.placed: list[Place] = []
         self._steps = {
             "resting": self._resting,
@@ -71,16 +56,6 @@ class Relocator:
             "placing": self._placing,
             "helped": self._helped,
         }
-
-    @property
-    def failure(self) -> str:
-        """Why the application cannot go on; empty while it can."""
-        return self._watch.detail if self._watch.given_up(self._now_s) else ""
-
-    @property
-    def finished(self) -> bool:
-        """Whether the object was put at all positions."""
-        return len(self.placed) >= self._options.places
 
     def on_gesture(self, gesture: Gesture) -> None:
         """The tracker recognised a pointing gesture. One captured before the robot's request is ignored."""
@@ -94,88 +69,69 @@ class Relocator:
 
     def on_estimate(self, estimate: ActionEstimate) -> None:
         """The tracker's estimate of the person's arm."""
-        self._sight.on_estimate(estimate, self._now_s)
+        self._sight.on_estimate(estimate, self.now_s)
 
-    def on_goal_status(self, status: RelocationStatus) -> None:
-        """The arm reports the status of a goal."""
-        self._goal_client.on_status(status)
+    def begin(self) -> None:
+        """Bring the arm to its base pose, wherever it is."""
+        self._rest()
 
-    def on_safety(self, state: SafetyState) -> None:
-        """The safety gate reports its state."""
-        armed = not self._watch.lost
-        self._watch.on_safety(state, self._now_s)
-        if armed and self._watch.lost:
-            self._speak(f"I cannot go on: {self._watch.detail}.")
-
-    def tick(self, now_s: float) -> OutgoingMessages:
-        """One tick; returns the messages to publish."""
-        self._now_s = now_s
-        if not self.state:
-            self._rest()
-        elif arming := self._watch.first_arming(now_s):
-            if self.detail != arming:
-                self._speak(arming)
-        elif not self.finished and not self._watch.lost:
-            self._steps[self.state]()
-        self._goal_client.step(now_s, self._outgoing)
-        self._publish_stage()
-        outgoing, self._outgoing = self._outgoing, OutgoingMessages()
-        return outgoing
+    def step(self) -> None:
+        """One tick of the state."""
+        self._steps[self.state]()
 
     # States
 
     def _rest(self) -> None:
-        """Bring the arm to its base pose, wherever it is."""
-        self._goal_client.start(RelocationGoal.KIND_REST, self._now_s)
-        self._go("resting")
+        self.goal_client.start(RelocationGoal.KIND_REST, self.now_s)
+        self.go("resting")
 
     def _resting(self) -> None:
-        outcome = self._goal_client.outcome
-        if self._goal_client.succeeded:
+        outcome = self.goal_client.outcome
+        if self.goal_client.succeeded:
             self._fetch() if self._offset is not None else self._ask_to_align()
         elif outcome is not None:
             self._ask_for_help(f"I cannot bring my arm to rest: {outcome.reason}")
 
     def _fetch(self) -> None:
         x, y, z = self._options.hold
-        source, hold = self._goals.position(self._object_at), Position(x=x, y=y, z=z)
+        source, hold = self.goal_client.position(self._object_at), Position(x=x, y=y, z=z)
         self._start(RelocationGoal.KIND_FETCH, source, hold, 1 + self._missed)
-        self._go("fetching")
+        self.go("fetching")
 
     def _fetching(self) -> None:
-        outcome = self._goal_client.outcome
-        if self._goal_client.succeeded:
+        outcome = self.goal_client.outcome
+        if self.goal_client.succeeded:
             self._missed, self._holding = 0, True
             self._ask()
         elif outcome is not None:
             self._missed += 1
             failed = outcome.state == RelocationStatus.STATE_FAILED
             if failed and self._missed < self._options.attempts:
-                self._speak(f"I could not fetch it at {cm(self._object_at)}: {outcome.reason}. I try again.")
+                self.speak(f"I could not fetch it at {cm(self._object_at)}: {outcome.reason}. I try again.")
                 self._rest()
             else:
                 self._ask_for_help(f"I could not fetch it at {cm(self._object_at)}: {outcome.reason}")
 
     def _ask(self, before: str = "") -> None:
-        self._speak(f"{before}Please point at the place where I shall put it.", Speech.REQUEST_POINT_AT_PLACE)
+        self.speak(f"{before}Please point at the place where I shall put it.", Speech.REQUEST_POINT_AT_PLACE)
         self._wait_for("waiting")
 
     def _ask_to_align(self, before: str = "") -> None:
-        self._speak(f"{before}Please point at the object, so that I see how you point.", Speech.REQUEST_POINT_AT_OBJECT)
+        self.speak(f"{before}Please point at the object, so that I see how you point.", Speech.REQUEST_POINT_AT_OBJECT)
         self._wait_for("aligning")
 
     def _wait_for(self, state: str) -> None:
-        self._quiet_since_s, self._reported = self._now_s, set()
-        self._go(state)
+        self._quiet_since_s, self._reported = self.now_s, set()
+        self.go(state)
 
     def _watch_for(self, ask: Callable[[str], None]) -> None:
-        trouble = self._sight.trouble(self._now_s)
+        trouble = self._sight.trouble(self.now_s)
         if trouble:
-            self._quiet_since_s = self._now_s
+            self._quiet_since_s = self.now_s
             if trouble not in self._reported:
                 self._reported.add(trouble)
-                self._speak(f"I do not see where you point: {trouble}. I wait.")
-        elif self._now_s - self._quiet_since_s > self._options.ask_again_s:
+                self.speak(f"I do not see where you point: {trouble}. I wait.")
+        elif self.now_s - self._quiet_since_s > self._options.ask_again_s:
             ask("I have not seen you point. ")
 
     def _pointed_at(self, gesture: Gesture) -> None:
@@ -186,8 +142,8 @@ class Relocator:
             self._ask(f"{doubt} ")
             return
         self._target = target
-        self._speak(f"You point at {cm(target)}, certain to {100 * gesture.confidence:.0f} %. I put it there.")
-        self._go("letting_hand_leave")
+        self.speak(f"You point at {cm(target)}, certain to {100 * gesture.confidence:.0f} %. I put it there.")
+        self.go("letting_hand_leave")
 
     def _pointed_at_object(self, gesture: Gesture) -> None:
         offset = (gesture.x - self._object_at[0], gesture.y - self._object_at[1])
@@ -198,8 +154,8 @@ class Relocator:
             self._ask_to_align(f"{doubt} ")
             return
         self._offset, self._target = offset, self._object_at
-        self._speak(f"I see you point {1000 * math.hypot(*offset):.0f} mm beside the object. I bear that in mind.")
-        self._go("letting_hand_leave")
+        self.speak(f"I see you point {1000 * math.hypot(*offset):.0f} mm beside the object. I bear that in mind.")
+        self.go("letting_hand_leave")
 
     def _doubt(self, gesture: Gesture) -> str:
         """Why a gesture's target is not accepted; empty if it is."""
@@ -226,23 +182,23 @@ class Relocator:
 
     def _letting_hand_leave(self) -> None:
         """Wait until the hand is known to be away from the target."""
-        away_s = self._sight.away_for(self._target, self._options.hand_away, self._now_s)
+        away_s = self._sight.away_for(self._target, self._options.hand_away, self.now_s)
         if away_s >= self._options.hand_away_s and not self._holding:
             self._fetch()
         elif away_s >= self._options.hand_away_s:
-            self._start(RelocationGoal.KIND_PLACE_HELD, None, self._goals.position(self._target))
-            self._go("placing")
-        elif self._now_s - self._since_s > self._options.ask_again_s:
-            self._speak(f"Please take your hand away from {cm(self._target)}, so that I can go there.")
-            self._go("letting_hand_leave")
+            self._start(RelocationGoal.KIND_PLACE_HELD, None, self.goal_client.position(self._target))
+            self.go("placing")
+        elif self.for_s > self._options.ask_again_s:
+            self.speak(f"Please take your hand away from {cm(self._target)}, so that I can go there.")
+            self.go("letting_hand_leave")
 
     def _placing(self) -> None:
-        outcome = self._goal_client.outcome
-        if self._goal_client.succeeded:
+        outcome = self.goal_client.outcome
+        if self.goal_client.succeeded:
             self._object_at, self._holding = self._target, False
             self.placed.append(self._target)
-            self._speak(f"It stands at {cm(self._target)}.")
-            self._finish() if self.finished else self._fetch()
+            self.speak(f"It stands at {cm(self._target)}.")
+            self._fetch() if len(self.placed) < self._options.places else self._finish()
         elif outcome is None:
             return
         elif outcome.state == RelocationStatus.STATE_REJECTED:
@@ -251,50 +207,29 @@ class Relocator:
             self._ask_for_help(f"I could not put it at {cm(self._target)}: {outcome.reason}")
 
     def _finish(self) -> None:
-        self._speak("It has been at all places. Thank you!", Speech.REQUEST_THANK_YOU)
-        self._go("resting")
+        self.speak("It has been at all places. Thank you!", Speech.REQUEST_THANK_YOU)
+        self.stage = ApplicationStage.STAGE_DONE
+        self.go("done")
 
     def _ask_for_help(self, detail: str) -> None:
         """Ask a person to put the object back to its start: its position is no longer known."""
         self._object_at, self._missed, self._holding = self._options.start, 0, False
-        self._speak(f"{detail}. Please stand it at {cm(self._object_at)}.", Speech.REQUEST_HELP)
-        self._go("helped")
+        self.speak(f"{detail}. Please stand it at {cm(self._object_at)}.", Speech.REQUEST_HELP)
+        self.go("helped")
 
     def _helped(self) -> None:
-        if self._now_s - self._since_s > self._options.ask_again_s:
+        if self.for_s > self._options.ask_again_s:
             self._rest()
 
     # Outgoing messages
 
     def _start(self, kind: RelocationGoal.Kind, source: Position | None, target: Position, attempt: int = 1) -> None:
         o = self._options
-        self._goal_client.start(kind, self._now_s, o.object_name, source, target, o.standing, attempt)
+        self.goal_client.start(kind, self.now_s, o.object_name, source, target, o.standing, attempt)
 
-    def _go(self, state: str) -> None:
-        self.state, self._since_s = state, self._now_s
-
-    def _speak(self, detail: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
-        speech = Speech(request=request, object=self._options.object_name, text=detail)
-        speech.captured.FromNanoseconds(round(self._now_s * 1e9))
-        self._outgoing.speech.append(speech)
-        self.detail = detail
-        _log.info("%.1f s: %s", self._now_s, detail)
-
-    def _publish_stage(self) -> None:
-        """Publish the stage once a second and on every change."""
-        content = f"{self.state} {self.detail} {self.finished}"
-        if content == self._last_stage[0] and self._now_s - self._last_stage[1] < STAGE_PERIOD_S:
-            return
-        self._last_stage = (content, self._now_s)
-        message = ApplicationStage(
-            stage=ApplicationStage.STAGE_DONE if self.finished else ApplicationStage.STAGE_APPLY,
-            step="done" if self.finished else self.state,
-            detail=self.detail,
-            grasps=self._goal_client.grasps,
-            retries=self._goal_client.retries,
-        )
-        message.captured.FromNanoseconds(round(self._now_s * 1e9))
-        self._outgoing.stages.append(message)
+    def speak(self, detail: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED, name: str = "") -> None:
+        """Say something about the object."""
+        super().speak(detail, request, name or self._options.object_name)
 
 
 class ArmSight:
