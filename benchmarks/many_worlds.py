@@ -18,7 +18,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -95,7 +95,7 @@ class View:
             if "blue" not in detected:
                 return faults
             image.append((detected["blue"].u_px, detected["blue"].v_px))
-        self.calibration = replace(PlaneHomography.fit(image, CORNERS, GRASP_Z), object_name="blue").to_message()
+        self.calibration = PlaneHomography.fit(image, CORNERS, GRASP_Z, "right_shoulder", "blue").to_message()
         return faults
 
     def show_rule(self, name: str, start: Floats) -> Floats | None:

@@ -16,7 +16,6 @@ from paramove.objects import (
     PlaneHomography,
     PointingThresholds,
     Recognizer,
-    RecognizerOptions,
 )
 from paramove.pointing import PointingSetup
 
@@ -33,7 +32,7 @@ class Config(NodeConfig, PointingSetup):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes."""
-    recognizer = Recognizer(RecognizerOptions(config.motion, config.pointing))
+    recognizer = Recognizer(config.motion, config.pointing)
     pointing = config.pointing_source(bus.run_folder)
     calibration: PlaneCalibration | None = None
     bus.ready("watching objects and hand, not calibrated yet")

@@ -6,8 +6,6 @@ fetching it again each time. The image points and its own targets give the homog
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from paramove.applications.options import Place
 from paramove.applications.stage import ApplicationState, Stage, cm
 from paramove.applications.table import Sighting
@@ -185,12 +183,12 @@ class Calibrating(Stage):
         image = [(sighting.u_px, sighting.v_px) for _, sighting in self._observations]
         plane = [place for place, _ in self._observations]
         try:
-            homography = PlaneHomography.fit(image, plane, self.app.options.grasp_z)
+            options = self.app.options
+            homography = PlaneHomography.fit(image, plane, options.grasp_z, options.frame, self._held)
         except HomographyError as error:
             self._observations = []
             self._start_again(str(error))
             return None
-        homography = replace(homography, plane_frame=self.app.options.frame, object_name=self._held)
         self.app.outgoing.calibrations.append(homography.to_message(round(self.app.now_s * 1e9)))
         self.app.speak("Now I know where I see what I can reach.")
         return ApplicationStage.STAGE_LEARN

@@ -7,4 +7,3 @@ from .object_motion import MotionThresholds as MotionThresholds
 from .object_shape import ObjectShape as ObjectShape
 from .pointing import PointingThresholds as PointingThresholds
 from .recognizer import Recognizer as Recognizer
-from .recognizer import RecognizerOptions as RecognizerOptions

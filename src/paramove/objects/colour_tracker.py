@@ -21,6 +21,10 @@ from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.objects.full_size import FullSize, Size
 from paramove.objects.openings import find_openings
 
+MIN_AREA_PX = 24.0
+"""Smaller regions are noise; an object of 20 x 50 mm has about 400 px."""
+MAX_AREA_FRACTION = 0.12
+"""Regions above this fraction of the image are background."""
 MAX_PIECES = 6
 TWIN_SHARE = 0.4
 """Of the area of the largest region of a colour, from which another one apart from it can be an object."""
@@ -59,49 +63,23 @@ DEFAULT_COLOURS = (
 """Gaps of at least 15 degrees between neighbours keep noisy dark pixels out of the wrong colour."""
 
 
-@dataclass(frozen=True)
-class Region:
-    """One measured region. Pixels; u right, v down; the middle of the first pixel is 0.
-
-    (u, v) is the centre of gravity, for a hand the middle of its palm; `lean` is du/dv along the long axis.
-    """
-
-    u_px: float
-    v_px: float
-    area_px: float
-    left_px: float
-    top_px: float
-    width_px: float
-    height_px: float
-    lean: float
-    outline: Floats  # [M, 2] convex hull
-
-
 class ColourTracker:
     """Tracks one region per colour.
 
     Args:
         colours: The colours to track.
-        min_area_px: Smaller regions are noise; an object of 20 x 50 mm has about 400 px.
-        max_area_fraction: Regions above this fraction of the image are background.
     """
 
     STILL_PX = 0.75  # centres of a standing object scatter by about 0.15 px
     STILL_FRAMES = 8  # half a second at 15 Hz
 
-    def __init__(
-        self, colours: Sequence[Colour] = DEFAULT_COLOURS, min_area_px: float = 24.0, max_area_fraction: float = 0.12
-    ) -> None:
+    def __init__(self, colours: Sequence[Colour] = DEFAULT_COLOURS) -> None:
         if not colours or len({colour.name for colour in colours}) != len(colours):
             raise ValueError(f"colours {[c.name for c in colours]}: at least one, each name once, expected")
         cv2.setNumThreads(1)  # images are small: threads cost more than they give, and other nodes need the cores
         self._colours = tuple(colours)
-        self._min_area = min_area_px
-        self._max_area_fraction = max_area_fraction
         self._full_size = FullSize()
-        self._recent: dict[str, deque[Region]] = {
-            colour.name: deque(maxlen=self.STILL_FRAMES) for colour in self._colours
-        }
+        self._recent = {colour.name: deque[TrackedObject](maxlen=self.STILL_FRAMES) for colour in self._colours}
 
     def update(self, image_bgr: Image, captured_ns: int = 0) -> TrackedObjects:
         """The coloured regions of one image [H, W, 3] uint8, BGR. Raises ValueError for any other array."""
@@ -115,73 +93,28 @@ class ColourTracker:
         _, coloured = cv2.threshold(chroma, int(_min_chroma(small, hsv)), 255, cv2.THRESH_BINARY)
         tracked.openings.extend(find_openings(hsv[:, :, 2]))
         for colour in self._colours:
-            box, twin = self._find(_of_colour(hsv, coloured, colour))
+            box, twin = _find(_of_colour(hsv, coloured, colour))
             region = None if box is None else _measure(image_bgr, box, colour)
-            if region is not None and region.area_px >= self._min_area:
-                tracked.objects.append(self._message(colour, region))
-                tracked.objects[-1].twin = twin and not colour.hand
-            else:
+            if region is None or region.area_px < MIN_AREA_PX:
                 self._recent[colour.name].clear()
+                continue
+            if not colour.hand:
+                region.twin, region.confidence = twin, self._visible_fraction(region)
+            tracked.objects.append(region)
         return tracked
 
-    def _find(self, mask: Image) -> tuple[tuple[int, int, int, int] | None, bool]:
-        """Box (left, top, right, bottom), full-resolution px, of the largest region and its nearby pieces.
-
-        Also whether there is another one that can be an object.
-        """
-        x, y, width, height = cv2.boundingRect(mask)
-        if width == 0:
-            return None, False
-        _, _, stats, _ = cv2.connectedComponentsWithStats(mask[y : y + height, x : x + width], connectivity=8)
-        minimum, maximum = self._min_area / 4, self._max_area_fraction * mask.size
-        areas = stats[1:, cv2.CC_STAT_AREA]
-        pieces = stats[1:][(areas >= max(2.0, 0.1 * minimum)) & (areas <= maximum)]
-        pieces = pieces[np.argsort(-pieces[:, cv2.CC_STAT_AREA], kind="stable")][:MAX_PIECES]
-        if not len(pieces) or pieces[0][cv2.CC_STAT_AREA] < minimum:
-            return None, False
-        left, top, right, bottom = _corners(pieces[0])
-        reach, twin = max(right - left, bottom - top), False
-        for piece in pieces[1:]:  # an arm in front may cut a region into pieces
-            if piece[cv2.CC_STAT_AREA] < max(minimum, 0.1 * pieces[0][cv2.CC_STAT_AREA]):
-                break
-            other = _corners(piece)
-            if max(left - other[2], other[0] - right, top - other[3], other[1] - bottom) <= 0.5 * reach:
-                left, top = min(left, other[0]), min(top, other[1])
-                right, bottom = max(right, other[2]), max(bottom, other[3])
-            else:
-                twin |= bool(piece[cv2.CC_STAT_AREA] >= TWIN_SHARE * pieces[0][cv2.CC_STAT_AREA])
-        return (2 * (x + left), 2 * (y + top), 2 * (x + right), 2 * (y + bottom)), twin
-
-    def _message(self, colour: Colour, region: Region) -> TrackedObject:
-        kind = TrackedObject.KIND_HAND if colour.hand else TrackedObject.KIND_OBJECT
-        message = TrackedObject(
-            name=colour.name,
-            kind=kind,
-            u_px=region.u_px,
-            v_px=region.v_px,
-            area_px=region.area_px,
-            width_px=region.width_px,
-            height_px=region.height_px,
-            left_px=region.left_px,
-            top_px=region.top_px,
-            lean=region.lean,
-            confidence=1.0,
-        )
-        for u, v in region.outline:
-            message.outline.add(u_px=float(u), v_px=float(v))
-        if colour.hand:
-            return message
-        recent = self._recent[colour.name]
+    def _visible_fraction(self, region: TrackedObject) -> float:
+        """Of an object, whose full size is learned while it stands still."""
+        recent = self._recent[region.name]
         recent.append(region)
         if self._stands_still(recent):
             area, height = median(r.area_px for r in recent), median(r.height_px for r in recent)
             lower = region.top_px + region.height_px - region.v_px
             size = Size(area, height, region.width_px, lower, region.lean)
-            self._full_size.learn(colour.name, region.u_px, region.v_px, size)
-        message.confidence = self._full_size.visible_fraction(colour.name, region.u_px, region.v_px, region.area_px)
-        return message
+            self._full_size.learn(region.name, region.u_px, region.v_px, size)
+        return self._full_size.visible_fraction(region.name, region.u_px, region.v_px, region.area_px)
 
-    def _stands_still(self, recent: deque[Region]) -> bool:
+    def _stands_still(self, recent: deque[TrackedObject]) -> bool:
         if len(recent) < self.STILL_FRAMES:
             return False
         latest = recent[-1]
@@ -224,12 +157,41 @@ def _of_colour(hsv: Image, coloured: Image, colour: Colour) -> Image:
     return cv2.bitwise_and(mask, coloured)
 
 
+def _find(mask: Image) -> tuple[tuple[int, int, int, int] | None, bool]:
+    """Box (left, top, right, bottom), full-resolution px, of the largest region and its nearby pieces.
+
+    Also whether there is another one that can be an object.
+    """
+    x, y, width, height = cv2.boundingRect(mask)
+    if width == 0:
+        return None, False
+    _, _, stats, _ = cv2.connectedComponentsWithStats(mask[y : y + height, x : x + width], connectivity=8)
+    minimum, maximum = MIN_AREA_PX / 4, MAX_AREA_FRACTION * mask.size
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    pieces = stats[1:][(areas >= max(2.0, 0.1 * minimum)) & (areas <= maximum)]
+    pieces = pieces[np.argsort(-pieces[:, cv2.CC_STAT_AREA], kind="stable")][:MAX_PIECES]
+    if not len(pieces) or pieces[0][cv2.CC_STAT_AREA] < minimum:
+        return None, False
+    left, top, right, bottom = _corners(pieces[0])
+    reach, twin = max(right - left, bottom - top), False
+    for piece in pieces[1:]:  # an arm in front may cut a region into pieces
+        if piece[cv2.CC_STAT_AREA] < max(minimum, 0.1 * pieces[0][cv2.CC_STAT_AREA]):
+            break
+        other = _corners(piece)
+        if max(left - other[2], other[0] - right, top - other[3], other[1] - bottom) <= 0.5 * reach:
+            left, top = min(left, other[0]), min(top, other[1])
+            right, bottom = max(right, other[2]), max(bottom, other[3])
+        else:
+            twin |= bool(piece[cv2.CC_STAT_AREA] >= TWIN_SHARE * pieces[0][cv2.CC_STAT_AREA])
+    return (2 * (x + left), 2 * (y + top), 2 * (x + right), 2 * (y + bottom)), twin
+
+
 def _corners(row: NDArray[np.int32]) -> tuple[int, int, int, int]:
     left, top = int(row[cv2.CC_STAT_LEFT]), int(row[cv2.CC_STAT_TOP])
     return left, top, left + int(row[cv2.CC_STAT_WIDTH]), top + int(row[cv2.CC_STAT_HEIGHT])
 
 
-def _measure(image: Image, box: tuple[int, int, int, int], colour: Colour) -> Region | None:
+def _measure(image: Image, box: tuple[int, int, int, int], colour: Colour) -> TrackedObject | None:
     """Measure the region of a colour within the box and 5 px around it."""
     left, top = max(0, box[0] - 5), max(0, box[1] - 5)
     patch = cv2.GaussianBlur(image[top : box[3] + 5, left : box[2] + 5], (3, 3), 0.8)
@@ -241,10 +203,11 @@ def _measure(image: Image, box: tuple[int, int, int, int], colour: Colour) -> Re
     # The 30th percentile is the region's shaded side; half of it is the border between region and grey background.
     side = float(of_hue_chroma[int(0.3 * of_hue_chroma.size)])
     weight = np.clip((chroma - 0.25 * side) * (2.0 / side), 0.0, 1.0) * (of_hue > 0)
-    return _region(weight, left, top, colour.hand)
+    return _region(weight, left, top, colour)
 
 
-def _region(weight: Floats, left: int, top: int, hand: bool) -> Region | None:
+def _region(weight: Floats, left: int, top: int, colour: Colour) -> TrackedObject | None:
+    """(u, v) is the centre of gravity, for a hand the middle of its palm. The middle of the first pixel is 0."""
     area = float(weight.sum())
     if area <= 0:
         return None
@@ -253,9 +216,11 @@ def _region(weight: Floats, left: int, top: int, hand: bool) -> Region | None:
     top_edge, bottom_edge = _extent(rows)
     u, v = float(columns @ np.arange(columns.size)) / area, float(rows @ np.arange(rows.size)) / area
     lean = _lean(weight, u, v)
-    if hand:
+    if colour.hand:
         u, v = _palm(weight)
-    return Region(
+    region = TrackedObject(
+        name=colour.name,
+        kind=TrackedObject.KIND_HAND if colour.hand else TrackedObject.KIND_OBJECT,
         u_px=left + u,
         v_px=top + v,
         area_px=area,
@@ -264,8 +229,11 @@ def _region(weight: Floats, left: int, top: int, hand: bool) -> Region | None:
         width_px=right_edge - left_edge,
         height_px=bottom_edge - top_edge,
         lean=lean,
-        outline=_outline(weight, left, top),
+        confidence=1.0,
     )
+    for column, row in _outline(weight, left, top):
+        region.outline.add(u_px=float(column), v_px=float(row))
+    return region
 
 
 def _lean(weight: Floats, u: float, v: float) -> float:

@@ -29,24 +29,30 @@ class PlaneHomography:
     Attributes:
         plane_from_image_matrix: [3, 3], element (2, 2) is 1.
         plane_z: height of the plane in `plane_frame`, m.
-        plane_frame, image_frame: names of the frames.
+        plane_frame: name of the frame; empty if that is not known.
         correspondences: [M, 4] rows (u_px, v_px, x, y) that it was fitted to.
         object_name: Of the object whose middle was seen there; empty if that is not known.
     """
 
     plane_from_image_matrix: Floats
     plane_z: float = 0.0
-    plane_frame: str = "right_shoulder"
-    image_frame: str = "camera_optical"
+    plane_frame: str = ""
     correspondences: Floats | None = None
     object_name: str = ""
 
     @classmethod
-    def fit(cls, image_points: ArrayLike, plane_points: ArrayLike, plane_z: float = 0.0) -> PlaneHomography:
+    def fit(
+        cls,
+        image_points: ArrayLike,
+        plane_points: ArrayLike,
+        plane_z: float = 0.0,
+        plane_frame: str = "",
+        object_name: str = "",
+    ) -> PlaneHomography:
         """Least-squares homography of >= 4 correspondences by the normalised DLT.
 
         Args:
-            image_points: [M, 2] px. plane_points: [M, 2] m. plane_z: m, stored with the homography.
+            image_points: [M, 2] px. plane_points: [M, 2] m. plane_z, plane_frame, object_name: see the attributes.
         Raises:
             HomographyError: fewer than 4, not finite, collinear or coinciding points, or an image that is a mirrored
                 view of the plane (two points were mixed up: a camera above the plane never gives a mirrored view).
@@ -61,7 +67,7 @@ class PlaneHomography:
         _check_not_collinear(image, "image")
         _check_not_collinear(plane, "plane")
         matrix = _direct_linear_transform(image, plane)
-        homography = cls(matrix, plane_z, correspondences=np.hstack([image, plane]))
+        homography = cls(matrix, plane_z, plane_frame, np.hstack([image, plane]), object_name)
         homography._check_not_mirrored(image)
         return homography
 
@@ -76,12 +82,12 @@ class PlaneHomography:
             raise HomographyError(f"plane_from_image is singular: {matrix.tolist()}")
         rows = [(c.u_px, c.v_px, c.x, c.y) for c in message.correspondences]
         known = np.array(rows, dtype=np.float64) if rows else None
-        return cls(matrix, message.plane_z, message.plane_frame, message.image_frame, known, message.object)
+        return cls(matrix, message.plane_z, message.plane_frame, known, message.object)
 
     def to_message(self, captured_ns: int = 0) -> PlaneCalibration:
         """The calibration as the message that `from_message` reads."""
         message = PlaneCalibration(
-            image_frame=self.image_frame,
+            image_frame="camera_optical",
             plane_frame=self.plane_frame,
             plane_z=self.plane_z,
             plane_from_image=self.plane_from_image_matrix.ravel().tolist(),
@@ -120,13 +126,6 @@ class PlaneHomography:
     def image_from_plane(self, x: float, y: float) -> tuple[float, float]:
         """(u, v), px. Raises ValueError for a point without a finite image."""
         return _apply(np.asarray(np.linalg.inv(self.plane_from_image_matrix), dtype=np.float64), x, y)
-
-    def residuals(self) -> Floats:
-        """Distance of each correspondence to its mapped image point, m, [M]. All 0 when there are just four."""
-        if self.correspondences is None:
-            return np.zeros(0)
-        mapped = np.array([self.plane_from_image(u, v) for u, v, _, _ in self.correspondences])
-        return np.asarray(np.linalg.norm(mapped - self.correspondences[:, 2:], axis=1), dtype=np.float64)
 
     def foreshortening(self, u_px: float, v_px: float) -> float:
         """Height over width of the box around a small circle of the plane, in the image near (u, v).

@@ -180,8 +180,9 @@ class ObjectMotion:
         return []
 
     def _teach(self, position: Sample) -> None:
+        """Adds a sample at rest to the known full sizes."""
         stands = position.time_s - self._rests_since_s >= self._limits.stands_s
-        position.teach(self._full_size, self.name, stands=stands)
+        self._full_size.learn(self.name, position.u_px, position.v_px, position.size, stands=stands)
 
     def _still_samples(self, now_s: float) -> list[Sample]:
         """The samples of the last `rest_s`, or [] if any border moved."""

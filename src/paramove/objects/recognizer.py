@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -33,27 +32,19 @@ CLOCK_BACK_S = 5.0
 """An image older than this is not delayed: the clock, or an image's time, was wrong."""
 
 
-@dataclass(frozen=True)
-class RecognizerOptions:
-    """Thresholds."""
-
-    motion: MotionThresholds = field(default_factory=MotionThresholds)
-    pointing: PointingThresholds = field(default_factory=PointingThresholds)
-
-
 class Recognizer:
     """Keeps a small state per object and reports its changes, in the order of names, objects before the hand.
 
     All durations are observation times: they do not advance without images (the camera restarts, it is dark).
     """
 
-    def __init__(self, options: RecognizerOptions | None = None) -> None:
-        self._options = options or RecognizerOptions()
+    def __init__(self, motion: MotionThresholds | None = None, pointing: PointingThresholds | None = None) -> None:
+        self._thresholds = motion or MotionThresholds()
         self._full_size = FullSize()
         self._openings = OpeningTracker()
         self._objects: dict[str, ObjectMotion] = {}
         self._last_detected: dict[str, Sample] = {}
-        self._pointing = Pointing(self._options.pointing)
+        self._pointing = Pointing(pointing or PointingThresholds())
         self._hand = _HandPresence()
         self._calibrated: tuple[PlaneCalibration, PlaneHomography] | None = None
         self._plane_height = 0.0
@@ -110,7 +101,7 @@ class Recognizer:
         transitions: list[tuple[str, Transition]] = []
         for name in sorted(self._last_detected):
             if name not in self._objects:
-                self._objects[name] = ObjectMotion(name, self._full_size, self._options.motion)
+                self._objects[name] = ObjectMotion(name, self._full_size, self._thresholds)
             near = hand is not None and _touch(hand, self._last_detected[name])
             transitions += [
                 (name, transition) for transition in self._objects[name].update(detected.get(name), now_s, near)

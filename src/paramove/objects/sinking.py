@@ -68,10 +68,6 @@ class Sample:
         lean = float(np.clip(self.lean, -STEEPEST_AXIS, STEEPEST_AXIS))
         return Size(self.area_px, self.height_px, self.width_px, self.bottom_px - self.v_px, lean)
 
-    def teach(self, full_size: FullSize, name: str, *, stands: bool) -> None:
-        """Adds this sample of an object at rest to the known full sizes."""
-        full_size.learn(name, self.u_px, self.v_px, self.size, stands=stands)
-
     def displacement_px(self, other: Sample) -> float:
         """Minimum distance that the object has moved.
 
