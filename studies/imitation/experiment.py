@@ -109,8 +109,8 @@ def run_experiment(setup: Setup, progress: Callable[[str], None] = lambda _: Non
         progress(f"demonstrator {seed}: training")
         cache = None if setup.cache is None else setup.cache / f"reaching_{seed}.npz"
         model = train_reaching_model(seed, cache=cache)
-        movement = RobotMovement.from_model(model, solver.length)
-        linear = RobotMovement.from_model(model, solver.length, elbow_interpolation="linear")
+        movement = RobotMovement(model, solver.length)
+        linear = RobotMovement(model, solver.length, elbow_interpolation="linear")
         references = References.of(model, seed, setup.repetitions)
         for number, (target, kind) in enumerate(_compared_targets(setup)):
             progress(f"demonstrator {seed}: {target.name}")

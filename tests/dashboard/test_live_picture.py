@@ -14,7 +14,7 @@ from paramove.bus import topics
 from paramove.bus.topics import Topic
 from paramove.dashboard.live_picture import LivePicture, NodeTable, Surface
 from paramove.dashboard.robot_shape import RobotShape
-from paramove.motion.setup import SurfaceParameters
+from paramove.motion.clearance import SurfaceParameters
 from paramove.msgs.action_estimate_pb2 import ActionEstimate, Location
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.node_status_pb2 import NodeStatus

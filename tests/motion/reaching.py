@@ -9,11 +9,10 @@ import numpy as np
 
 from paramove.demonstrations.reaching import train_reaching_model
 from paramove.motion.arm_pose import ArmPoseSolver
-from paramove.motion.clearance import ClearanceChecker, UprightCylinder, WorkSurface
+from paramove.motion.clearance import ClearanceChecker, SurfaceParameters
 from paramove.motion.conversion import RobotMovement
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.relocation import RelocationPlanner
-from paramove.motion.setup import SurfaceParameters
 from paramove.phmm import InterpolativePHMM
 from paramove.robots.description import Arm, RobotDescription
 
@@ -44,7 +43,7 @@ RIGHT = GripperArm.of(HOAP3, "right")
 
 @cache
 def movement() -> RobotMovement:
-    return RobotMovement.from_model(reaching_model(), solver().length)
+    return RobotMovement(reaching_model(), solver().length)
 
 
 @cache
@@ -54,9 +53,7 @@ def planner() -> RelocationPlanner:
 
 @cache
 def checker() -> ClearanceChecker:
-    box = WorkSurface(SURFACE.x, SURFACE.y, SURFACE.z)
-    cylinder = UprightCylinder(SURFACE.object_radius, SURFACE.object_height)
-    return ClearanceChecker(HOAP3, RIGHT, box, cylinder)
+    return ClearanceChecker(HOAP3, RIGHT, SURFACE)
 
 
 def at(place: tuple[float, float], z: float = GRASP_Z) -> np.ndarray:

@@ -69,7 +69,7 @@ def test_everything_is_scaled_by_the_length_of_the_arm() -> None:
 
 
 def test_a_longer_arm_makes_the_same_movement_larger() -> None:
-    double = RobotMovement.from_model(reaching_model(), 2 * solver().length)
+    double = RobotMovement(reaching_model(), 2 * solver().length)
     np.testing.assert_allclose(double.means, 2 * movement().means, rtol=1e-12, atol=0)
     assert double.reach_state == movement().reach_state
 
@@ -84,7 +84,7 @@ def test_states_of_arrival_and_grasp_are_about_those_of_the_thesis() -> None:
 
 def test_elbows_between_the_demonstrated_ones_belong_to_an_arm() -> None:
     """With elbows interpolated as points the upper arm shrinks in between."""
-    converted, as_points = movement(), RobotMovement.from_model(reaching_model(), solver().length, "linear")
+    converted, as_points = movement(), RobotMovement(reaching_model(), solver().length, "linear")
     corners = converted.grid.points()
     np.testing.assert_allclose(
         converted.poses(corners[5]).stacked(), as_points.poses(corners[5]).stacked(), rtol=0, atol=1e-9
@@ -128,7 +128,8 @@ def test_opening_goes_from_one_to_nought() -> None:
 def test_poses_stack_join_and_slice() -> None:
     poses = movement().poses(movement().grid.points()[0])
     np.testing.assert_array_equal(ArmPoses.from_stacked(poses.stacked()).gripper, poses.gripper)
-    np.testing.assert_array_equal(ArmPoses.joined([poses[:30], poses[30:]]).stacked(), poses.stacked())
+    parts = np.concatenate([poses[:30].stacked(), poses[30:].stacked()])
+    np.testing.assert_array_equal(parts, poses.stacked())
 
 
 @pytest.mark.parametrize("lost", ["elbow", "thumb", "shoulder"])
@@ -137,17 +138,17 @@ def test_a_model_without_a_needed_point_is_refused_by_name(lost: str) -> None:
     assert description is not None
     names = tuple("other" if name == lost else name for name in description.point_names)
     with pytest.raises(ValueError, match=f"needed also: {lost}"):
-        RobotMovement.from_model(described(point_names=names), 0.243)
+        RobotMovement(described(point_names=names), 0.243)
 
 
 def test_a_model_without_a_description_is_refused() -> None:
     model = described()
     model.description = None
     with pytest.raises(ValueError, match="the model has the points none; needed also: shoulder, elbow"):
-        RobotMovement.from_model(model, 0.243)
+        RobotMovement(model, 0.243)
 
 
 @pytest.mark.parametrize(("arrival", "grasp"), [(0.0, 0.0), (0.6, 0.5), (0.4, 1.0)])
 def test_a_model_that_does_not_say_when_the_target_is_reached_is_refused(arrival: float, grasp: float) -> None:
     with pytest.raises(ValueError, match="a reaching action has 0 < arrival < grasp < 1"):
-        RobotMovement.from_model(described(arrival=arrival, grasp=grasp), 0.243)
+        RobotMovement(described(arrival=arrival, grasp=grasp), 0.243)

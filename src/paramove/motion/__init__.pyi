@@ -1,4 +1,5 @@
 from .arm_pose import ArmPoseSolver as ArmPoseSolver
+from .clearance import SurfaceParameters as SurfaceParameters
 from .conversion import RobotMovement as RobotMovement
 from .gripper_arm import GripperArm as GripperArm
 from .plans import FARTHEST_M as FARTHEST_M
@@ -11,6 +12,5 @@ from .reaching_movement import ArmPoses as ArmPoses
 from .relocation import RelocationOptions as RelocationOptions
 from .servo_arm_reaching import ServoArmReaching as ServoArmReaching
 from .setup import MovementSource as MovementSource
-from .setup import SurfaceParameters as SurfaceParameters
 from .setup import plans_for as plans_for
 from .synthesizer import Synthesizer as Synthesizer

@@ -22,6 +22,7 @@ _BISECTIONS = 7
 _JUMP = np.deg2rad(20.0)
 _MARGIN = np.deg2rad(0.3)  # inside the limits of the safety gate: paths are curves through these poses
 _NEARLY_STRAIGHT = 1e-9
+_X, _Y, _Z = range(3)
 
 
 class UnreachablePoseError(ValueError):
@@ -309,28 +310,23 @@ def _angles(upper_arm: Floats, forearm: Floats, aside: Floats) -> Floats:
     """
     pitch = np.arctan2(-upper_arm[..., 2], upper_arm[..., 0])
     roll = np.arcsin(np.clip(upper_arm[..., 1], -1.0, 1.0))
-    b = _rotate_z(_rotate_y(forearm, -pitch), -roll)
+    b = _rotated(_rotated(forearm, _Y, -pitch), _Z, -roll)
     elbow = -np.arccos(np.clip(b[..., 0], -1.0, 1.0))  # α4 = -(180° - γ°), corrected
     torsion = np.arctan2(-b[..., 1], b[..., 2])
-    y = _rotate_z(_rotate_y(aside, -pitch), -roll)
-    y = _rotate_y(_rotate_x(y, -torsion), -elbow)
+    y = _rotated(_rotated(aside, _Y, -pitch), _Z, -roll)
+    y = _rotated(_rotated(y, _X, -torsion), _Y, -elbow)
     wrist = np.arctan2(y[..., 2], y[..., 1])  # (5.21) with atan2, corrected
     return np.stack([pitch, roll, torsion, elbow, wrist], axis=-1)
 
 
-def _rotate_x(v: Floats, angle: Floats) -> Floats:
+def _rotated(v: Floats, axis: int, angle: Floats) -> Floats:
+    """Vectors [..., 3] turned about a coordinate axis."""
     c, s = np.cos(angle), np.sin(angle)
-    return np.stack([v[..., 0], c * v[..., 1] - s * v[..., 2], s * v[..., 1] + c * v[..., 2]], axis=-1)
-
-
-def _rotate_y(v: Floats, angle: Floats) -> Floats:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([c * v[..., 0] + s * v[..., 2], v[..., 1], -s * v[..., 0] + c * v[..., 2]], axis=-1)
-
-
-def _rotate_z(v: Floats, angle: Floats) -> Floats:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([c * v[..., 0] - s * v[..., 1], s * v[..., 0] + c * v[..., 1], v[..., 2]], axis=-1)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    turned = v.copy()
+    turned[..., first] = c * v[..., first] - s * v[..., second]
+    turned[..., second] = s * v[..., first] + c * v[..., second]
+    return turned
 
 
 def _cm(point: Floats) -> str:

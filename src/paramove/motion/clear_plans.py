@@ -100,7 +100,7 @@ class ClearPlans:
     ) -> PlannedMotion:
         """Reach from before the object as in 5.2.5; if not clear, or at a second attempt, lower the hand over it."""
         _check_at_base(start)
-        grasp.check_height(self._checker.cylinder.height)
+        grasp.check_height(self._checker.surface.object_height)
         heights = (self.planner.options.entry_height, _HIGHER_ENTRY)
         first = grasp.attempt % 2 == 0
         kinds = [(height, above) for above in (first, not first) for height in heights]

@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import BaseModel, ConfigDict
 
 from paramove.documents import Floats, Ints
 from paramove.motion.gripper_arm import GripperArm
@@ -19,25 +20,23 @@ FAR_M = 0.05
 """Larger distances are not distinguished."""
 GRASPED_ABOVE_MIDDLE = 0.011
 _HIDDEN = 10.0
+_THICKNESS_M = 0.1  # of the box
 _ADDED = ("surface", "held", *(f"standing_{k}" for k in range(MAX_STANDING)))
 
 
-@dataclass(frozen=True)
-class WorkSurface:
-    """A box whose upper face is the working plane; frame of the arm's base, m."""
+class SurfaceParameters(BaseModel):
+    """A humanoid's working surface in the shoulder's frame, m, and the upright objects on any arm's.
 
-    x: tuple[float, float]
-    y: tuple[float, float]
-    z: float
-    thickness: float = 0.1
+    Its working plane is the upper face of a box; the objects are cylinders.
+    """
 
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
-@dataclass(frozen=True)
-class UprightCylinder:
-    """The objects that are handled: they stand on the working plane."""
-
-    radius: float = 0.010
-    height: float = 0.050
+    x: tuple[float, float] = (0.100, 0.240)
+    y: tuple[float, float] = (-0.170, 0.130)
+    z: float = -0.134
+    object_radius: float = 0.010
+    object_height: float = 0.050
 
 
 @dataclass(frozen=True)
@@ -65,18 +64,15 @@ class ClearanceChecker:
     Args:
         robot: The robot's description; joints of other parts are in the base pose.
         arm: Which arm.
-        surface: The working surface.
-        cylinder: Shape of the standing objects, one of which may be held; then it is upright.
+        surface: The working surface and the standing objects, one of which may be held; then it is upright.
 
     Raises DescriptionError if the robot's model does not fit its description.
     """
 
-    def __init__(
-        self, robot: RobotDescription, arm: GripperArm, surface: WorkSurface, cylinder: UprightCylinder
-    ) -> None:
-        self.surface, self.cylinder = surface, cylinder
+    def __init__(self, robot: RobotDescription, arm: GripperArm, surface: SurfaceParameters) -> None:
+        self.surface = surface
         try:
-            self._model = model = _compiled(robot, surface, cylinder)
+            self._model = model = _compiled(robot, surface)
         except ValueError as error:  # of MuJoCo
             raise DescriptionError(f"{robot.model_path} does not fit the robot's description: {error}") from error
         check_model(robot, arm, model)
@@ -87,7 +83,7 @@ class ClearanceChecker:
         mujoco.mj_kinematics(model, data)
         self._base = np.array(data.site(arm.base_site).xpos)
         self._surface, self._held = (model.geom(name).id for name in ("surface", "held"))
-        middle = [sum(surface.x) / 2, sum(surface.y) / 2, surface.z - surface.thickness / 2]
+        middle = [sum(surface.x) / 2, sum(surface.y) / 2, surface.z - _THICKNESS_M / 2]
         self._surface_middle = self._base + np.array(middle)
         self._upright = [model.geom(f"standing_{k}").id for k in range(MAX_STANDING)]
         collides = [
@@ -104,7 +100,7 @@ class ClearanceChecker:
     @property
     def grasp_height(self) -> float:
         """Height at which a standing object is grasped, m."""
-        return self.surface.z + self.cylinder.height / 2 + GRASPED_ABOVE_MIDDLE
+        return self.surface.z + self.surface.object_height / 2 + GRASPED_ABOVE_MIDDLE
 
     def smallest(self, angles: ArrayLike, standing: ArrayLike, holding: ArrayLike, every: int = 2) -> Clearance:
         """The closest approach of the arm to surface and objects, of its hand to the body, and of what it holds.
@@ -176,7 +172,7 @@ class ClearanceChecker:
         check_number(places)
         self._data.mocap_pos[:] = _HIDDEN
         self._data.mocap_pos[self._mocap(self._surface)] = self._surface_middle
-        z = self.surface.z + self.cylinder.height / 2
+        z = self.surface.z + self.surface.object_height / 2
         for geom, (x, y) in zip(self._upright, places, strict=False):
             self._data.mocap_pos[self._mocap(geom)] = self._base + np.array([x, y, z])
         return self._upright[: len(places)]
@@ -219,12 +215,12 @@ class ClearanceChecker:
         return str(self._model.geom(geom).name or self._model.body(int(self._model.geom_bodyid[geom])).name)
 
 
-def _compiled(robot: RobotDescription, surface: WorkSurface, cylinder: UprightCylinder) -> mujoco.MjModel:
+def _compiled(robot: RobotDescription, surface: SurfaceParameters) -> mujoco.MjModel:
     """The robot's model with the surface and hidden cylinders, which collide with nothing by themselves."""
     spec = mujoco.MjSpec.from_file(str(robot.model_path))
     alone = {"contype": 0, "conaffinity": 0}
-    half = [(surface.x[1] - surface.x[0]) / 2, (surface.y[1] - surface.y[0]) / 2, surface.thickness / 2]
-    size = [cylinder.radius, cylinder.height / 2, 0.0]
+    half = [(surface.x[1] - surface.x[0]) / 2, (surface.y[1] - surface.y[0]) / 2, _THICKNESS_M / 2]
+    size = [surface.object_radius, surface.object_height / 2, 0.0]
     for name in _ADDED:
         body = spec.worldbody.add_body(name=name, mocap=True, pos=[_HIDDEN, _HIDDEN, _HIDDEN])
         if name == "surface":

@@ -12,7 +12,6 @@ which the elbow leaves that line is carried to the new line by the smallest rota
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -30,68 +29,42 @@ ElbowInterpolation = Literal["carried", "linear"]
 _NEWTON_STEPS = 3
 
 
-@dataclass(frozen=True)
 class RobotMovement(ReachingMovement):
     """The converted model: local state means of (elbow, gripper, finger to thumb) on the grid of targets.
+
+    Args:
+        model: Of a reaching action. Its description names the points shoulder, elbow, knuckle, index and thumb and the
+            progress at which the target is reached and the object is last held.
+        arm_length: l = a + b of the robot, m.
+        elbow_interpolation: "carried" interpolates the elbow as part of an arm, "linear" as a point on its own, as the
+            thesis does.
+
+    Raises:
+        ValueError: The model lacks a point or does not define when the target is reached.
 
     Attributes:
         grid: Targets in the robot's shoulder frame (t̂ of 5.2.3), m.
         means: [G, N, 9], m.
-        scale: s = l / l′.
-        o_min, o_max: Minimum and maximum distance of finger and thumb after scaling, m.
-        reach_state: State in which the gripper is at the target, still open (T of 5.2.5).
-        release_state: Last state in which the object is held (T′).
         shoulder: p̄, the demonstrator's mean shoulder, which is the origin here, [3], m, frame of the demonstrations.
-        elbow_interpolation: "carried" interpolates the elbow as part of an arm "linear" as
-            a point on its own, as the thesis does.
     """
 
-    grid: ParameterGrid
-    means: Floats
-    scale: float
-    o_min: float
-    o_max: float
-    reach_state: int
-    release_state: int
-    shoulder: Floats
-    elbow_interpolation: ElbowInterpolation = "carried"
-
-    @classmethod
-    def from_model(
-        cls, model: InterpolativePHMM, arm_length: float, elbow_interpolation: ElbowInterpolation = "carried"
-    ) -> RobotMovement:
-        """Convert a trained model of a reaching action.
-
-        Args:
-            model: Its description names the points shoulder, elbow, knuckle, index and thumb and the progress at which
-                the target is reached and the object is last held.
-            arm_length: l = a + b of the robot, m.
-            elbow_interpolation: As the attribute.
-
-        Raises:
-            ValueError: The model lacks a point or does not define when the target is reached.
-        """
+    def __init__(
+        self, model: InterpolativePHMM, arm_length: float, elbow_interpolation: ElbowInterpolation = "carried"
+    ) -> None:
         description = model.description or MovementDescription()
         person = points_of(model.means_, description.point_names)
-        reach_state, release_state = grasp_states(description, model.n_states)
-        shoulder = person["shoulder"].mean(axis=(0, 1))  # p̄
-        elbow, gripper, _ = arm_of(person, shoulder)
+        self.reach_state, self.release_state = grasp_states(description, model.n_states)
+        self.shoulder = person["shoulder"].mean(axis=(0, 1))  # p̄
+        elbow, gripper, _ = arm_of(person, self.shoulder)
         lengths = np.linalg.norm(elbow, axis=-1) + np.linalg.norm(gripper - elbow, axis=-1)
-        scale = arm_length / float(lengths.max())  # s = l / l′
-        means = np.concatenate(arm_of(person, shoulder), axis=-1) * scale  # (5.7)
-        size = np.linalg.norm(means[..., 6:], axis=-1)
-        grid = ParameterGrid((model.grid_.origin - shoulder) * scale, model.grid_.edges * scale, model.grid_.knots)
-        return cls(
-            grid=grid,
-            means=means,
-            scale=scale,
-            o_min=float(size.min()),
-            o_max=float(size.max()),
-            reach_state=reach_state,
-            release_state=release_state,
-            shoulder=shoulder,
-            elbow_interpolation=elbow_interpolation,
-        )
+        self.scale = arm_length / float(lengths.max())  # s = l / l′
+        self.means = np.concatenate(arm_of(person, self.shoulder), axis=-1) * self.scale  # (5.7)
+        size = np.linalg.norm(self.means[..., 6:], axis=-1)
+        self.o_min, self.o_max = float(size.min()), float(size.max())
+        grid = model.grid_
+        self.grid = ParameterGrid((grid.origin - self.shoulder) * self.scale, grid.edges * self.scale, grid.knots)
+        self.centre = np.asarray(self.grid.points().mean(axis=0))
+        self._elbow_interpolation = elbow_interpolation
 
     def converted(self, means: Floats, point_names: tuple[str, ...]) -> ArmPoses:
         """Converts other poses of the same person: scaled by s, relative to p̄ (5.7).
@@ -104,19 +77,6 @@ class RobotMovement(ReachingMovement):
             ValueError: A needed point is missing.
         """
         return ArmPoses(*(self.scale * part for part in arm_of(points_of(means, point_names), self.shoulder)))
-
-    @property
-    def centre(self) -> Floats:
-        """Mean of the grid's targets, [3], m."""
-        return np.asarray(self.grid.points().mean(axis=0))
-
-    def poses(self, parameter: ArrayLike) -> ArmPoses:
-        """State means for one parameter [3] of the grid: N poses (5.2)-(5.4), corrected."""
-        return ArmPoses.from_stacked(self._means(np.asarray(parameter, dtype=np.float64)[None])[0])
-
-    def poses_of_state(self, state: int, parameters: ArrayLike) -> ArmPoses:
-        """One state's mean for K parameters [K, 3]: the sequences θ_T^t of 5.2.5 in which only t varies."""
-        return ArmPoses.from_stacked(self._means(np.atleast_2d(np.asarray(parameters, dtype=np.float64)), state))
 
     def parameter_for(self, state: int, gripper: ArrayLike) -> Floats:
         """Parameters [K, 3] for which the gripper in `state` is at the given points [K, 3] (thesis 5.1, 1b).
@@ -138,11 +98,11 @@ class RobotMovement(ReachingMovement):
         coordinates = self.grid.coordinates(self.parameter_for(self.reach_state, target))
         return bool(((coordinates >= 0.0) & (coordinates <= 1.0)).all())
 
-    def _means(self, parameters: Floats, state: int | None = None) -> Floats:
-        """Means of all states, [K, N, 9], or of one, [K, 9], for K parameters."""
+    def means_at(self, parameters: Floats, state: int | None = None) -> Floats:
+        """Weighted means of the local models around each parameter (5.2)-(5.4), corrected."""
         weights, corners = self._corners(parameters, state)
         means: Floats = np.einsum("kc,kc...->k...", weights, corners)
-        if self.elbow_interpolation == "carried":
+        if self._elbow_interpolation == "carried":
             means[..., :3] = interpolated_elbow(weights, corners[..., :3], corners[..., 3:6])
         return means
 

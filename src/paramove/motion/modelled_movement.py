@@ -60,23 +60,9 @@ class ModelledMovement(ReachingMovement):
         length = np.linalg.norm(elbow, axis=-1) + np.linalg.norm(gripper - elbow, axis=-1)
         self.scale = arm_length / float(length.max())  # s = l / l′
         self._shoulder = person["shoulder"].mean(axis=(0, 1))  # p̄
-        self._centre: Floats = (targets.mean(axis=0) - self._shoulder) * self.scale
+        self.centre = (targets.mean(axis=0) - self._shoulder) * self.scale
         size = self.scale * np.linalg.norm(across, axis=-1)
         self.o_min, self.o_max = float(size.min()), float(size.max())
-
-    @property
-    def centre(self) -> Floats:
-        """Mean target of the training, [3], m."""
-        return self._centre
-
-    def poses(self, parameter: ArrayLike) -> ArmPoses:
-        """All states; those of a movement that ends at the target are followed by the same in reversed order."""
-        means = self._arm(np.asarray(parameter, dtype=np.float64)[None])[0]
-        return ArmPoses.from_stacked(means if self._returns else np.concatenate([means, means[::-1]]))
-
-    def poses_of_state(self, state: int, parameters: ArrayLike) -> ArmPoses:
-        """One state's mean for K parameters [K, 3]."""
-        return ArmPoses.from_stacked(self._arm(np.atleast_2d(np.asarray(parameters, dtype=np.float64)), state))
 
     def parameter_for(self, state: int, gripper: ArrayLike) -> Floats:
         """Parameters [K, 3] for which the gripper in `state` is at the given points [K, 3] (thesis 5.1, 1b).
@@ -88,7 +74,7 @@ class ModelledMovement(ReachingMovement):
             UnreachablePoseError: There is no parameter for a point.
         """
         target = np.atleast_2d(np.asarray(gripper, dtype=np.float64))
-        parameter: Floats = target + self._centre - self._gripper(state, self._centre[None])
+        parameter: Floats = target + self.centre - self._gripper(state, self.centre[None])
         missed = target - self._gripper(state, parameter)
         for _ in range(_NEWTON_STEPS):
             if np.abs(missed).max() < _EXACT:
@@ -137,7 +123,7 @@ class ModelledMovement(ReachingMovement):
             ) from error
         distance = np.linalg.norm(missed, axis=1)
         for _ in range(_HALVINGS):
-            tried = self._centre + np.clip(parameter + change - self._centre, -self._farthest, self._farthest)
+            tried = self.centre + np.clip(parameter + change - self.centre, -self._farthest, self._farthest)
             left = target - self._gripper(state, tried)
             worse = np.linalg.norm(left, axis=1) > distance
             if not worse.any():
@@ -155,13 +141,16 @@ class ModelledMovement(ReachingMovement):
         )
 
     def _gripper(self, state: int, parameters: Floats) -> Floats:
-        return self._arm(parameters, state)[..., 3:6]
+        return self.means_at(parameters, state)[..., 3:6]
 
-    def _arm(self, parameters: Floats, state: int | None = None) -> Floats:
-        """Elbow, gripper, finger to thumb of all states, [K, N, 9], or of one, [K, 9], for K parameters (5.7)."""
+    def means_at(self, parameters: Floats, state: int | None = None) -> Floats:
+        """State means; those of a movement that ends at the target are followed by the same in reversed order."""
         means = self._model.state_means(parameters / self.scale + self._shoulder)
+        last = 2 * self._model.n_states - 1
         if state is not None:
-            means = means[:, min(state, 2 * self._model.n_states - 1 - state) if not self._returns else state]
+            means = means[:, state if self._returns else min(state, last - state)]
+        elif not self._returns:
+            means = np.concatenate([means, means[:, ::-1]], axis=1)
         person = points_of(means, self._names)
         return np.concatenate(arm_of(person, person["shoulder"]), axis=-1) * self.scale
 
@@ -189,8 +178,8 @@ def robot_movement(model: ParametricHMM, arm_length: float) -> ReachingMovement:
     """The movement of a robot's arm of this length, m, by any model: a grid's with elbows as parts of an arm.
 
     Raises:
-        ValueError: The model does not suit, as of `RobotMovement.from_model` and `ModelledMovement`.
+        ValueError: The model does not suit, see `RobotMovement` and `ModelledMovement`.
     """
     if isinstance(model, InterpolativePHMM) and not ends_at_target(model.description or MovementDescription()):
-        return RobotMovement.from_model(model, arm_length)
+        return RobotMovement(model, arm_length)
     return ModelledMovement(model, arm_length)

@@ -31,15 +31,6 @@ class ArmPoses:
     def __getitem__(self, states: slice) -> ArmPoses:
         return ArmPoses(self.elbow[states], self.gripper[states], self.finger_to_thumb[states])
 
-    @classmethod
-    def joined(cls, parts: list[ArmPoses]) -> ArmPoses:
-        """One sequence after the other."""
-        return cls(
-            np.concatenate([p.elbow for p in parts]),
-            np.concatenate([p.gripper for p in parts]),
-            np.concatenate([p.finger_to_thumb for p in parts]),
-        )
-
     def stacked(self) -> Floats:
         """All components side by side, [K, 9]."""
         return np.concatenate([self.elbow, self.gripper, self.finger_to_thumb], axis=1)
@@ -54,6 +45,7 @@ class ReachingMovement(ABC):
     """A family of movements over the position that is reached, converted to a robot's arm (thesis 5.2.3).
 
     Attributes:
+        centre: Mean target of the training, [3], m, robot's shoulder frame.
         scale: s = l / l′.
         o_min, o_max: Minimum and maximum distance of finger and thumb after scaling, m.
         reach_state: State in which the gripper is at the target, still open (T of 5.2.5).
@@ -62,6 +54,7 @@ class ReachingMovement(ABC):
             comes from next to the body, where the robot's own hangs.
     """
 
+    centre: Floats
     scale: float
     o_min: float
     o_max: float
@@ -69,18 +62,9 @@ class ReachingMovement(ABC):
     release_state: int
     begins_above_table: bool = False
 
-    @property
     @abstractmethod
-    def centre(self) -> Floats:
-        """Mean target of the training, [3], m, robot's shoulder frame."""
-
-    @abstractmethod
-    def poses(self, parameter: ArrayLike) -> ArmPoses:
-        """All states for one parameter [3]."""
-
-    @abstractmethod
-    def poses_of_state(self, state: int, parameters: ArrayLike) -> ArmPoses:
-        """One state for K parameters [K, 3]: the sequences θ_T^t of 5.2.5 in which only t varies."""
+    def means_at(self, parameters: Floats, state: int | None = None) -> Floats:
+        """Elbow, gripper, finger to thumb for K parameters [K, 3]: all states, [K, N, 9], or one, [K, 9] (5.7)."""
 
     @abstractmethod
     def parameter_for(self, state: int, gripper: ArrayLike) -> Floats:
@@ -97,6 +81,14 @@ class ReachingMovement(ABC):
         """Normalised openings ξ of the gripper, 1 open, in the states of a movement, [N] (after 5.24, corrected)."""
         size = np.linalg.norm(states.finger_to_thumb, axis=-1)
         return np.asarray(np.clip((size - self.o_min) / (self.o_max - self.o_min), 0.0, 1.0))
+
+    def poses(self, parameter: ArrayLike) -> ArmPoses:
+        """All states for one parameter [3]."""
+        return ArmPoses.from_stacked(self.means_at(np.asarray(parameter, dtype=np.float64)[None])[0])
+
+    def poses_of_state(self, state: int, parameters: ArrayLike) -> ArmPoses:
+        """One state for K parameters [K, 3]: the sequences θ_T^t of 5.2.5 in which only t varies."""
+        return ArmPoses.from_stacked(self.means_at(np.atleast_2d(np.asarray(parameters, dtype=np.float64)), state))
 
     def approach(self, target: ArrayLike) -> tuple[ArmPoses, Floats]:
         """States 1..T of the movement that brings the gripper to `target` [3], and the openings."""

@@ -336,7 +336,7 @@ class RelocationPlanner:
         return ArmPoses(points.elbow, points.gripper, points.shoulder_from_hand[..., :, 1] * self.movement.o_max)
 
     def _finish(self, path: Path) -> PlannedMotion:
-        poses = ArmPoses.joined(path.poses)
+        poses = ArmPoses.from_stacked(np.concatenate([part.stacked() for part in path.poses]))
         opening, level = np.concatenate(path.opening), np.concatenate(path.level)
         smoothing = round(self.options.turn_smoothing / path.period)
         solution = self.solver.solve(

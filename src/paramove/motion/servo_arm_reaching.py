@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
-from paramove.motion.clearance import ClearanceChecker, UprightCylinder, WorkSurface
+from paramove.motion.clearance import ClearanceChecker, SurfaceParameters
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.hand_poses import HandPoses
 from paramove.motion.learned_path import SMOOTHING, LearnedPath, PlacedPerson
@@ -63,7 +63,7 @@ class ServoArmReaching:
     Args:
         description: Of a robot with a chain.
         model: Of a person's reaching, its parameter the position that is reached; scaled to the size of the arm.
-        cylinder: Shape of the objects that stand on the table.
+        surface: Shape of the objects that stand on the table, which is the plane z = 0 of the base.
 
     Raises:
         DescriptionError: The robot has no such arm.
@@ -80,7 +80,7 @@ class ServoArmReaching:
         self,
         description: RobotDescription,
         model: ParametricHMM,
-        cylinder: UprightCylinder | None = None,
+        surface: SurfaceParameters | None = None,
     ) -> None:
         chain = description.chain
         if chain is None:
@@ -97,16 +97,16 @@ class ServoArmReaching:
         self._limits = (velocity, acceleration, jerk)
         self.start_tolerance = float(np.deg2rad(description.stream.start_tolerance_deg))
         self._period = description.stream.period_us * 1e-6
-        table = WorkSurface((-_TABLE_M, _TABLE_M), (-_TABLE_M, _TABLE_M), o.table_z)
-        cylinder = cylinder or UprightCylinder()
-        self._clearance = ClearanceChecker(description, self.arm, table, cylinder)
+        sides = (-_TABLE_M, _TABLE_M)
+        table = (surface or SurfaceParameters()).model_copy(update={"x": sides, "y": sides, "z": 0.0})
+        self._clearance = ClearanceChecker(description, self.arm, table)
         self._poses = HandPoses(chain, self._clearance, self.arm.angle_of(o.work_opening), self.base_angles[:-1])
         length = float(np.hypot(*self._arm.upper_arm) + np.hypot(*self._arm.forearm) + self._arm.hand[0])
-        ahead = self._poses.ahead(o.table_z, self._grasp_band)
+        ahead = self._poses.ahead(0.0, self._grasp_band)
         self._usual_reach = float(np.quantile(ahead[:, 0], USUAL_REACH) - self._arm.yaw_axis[0])
         self._person = PlacedPerson(robot_movement(model, length), ahead.mean(axis=0), self._arm.yaw_axis, POINTS)
         self._fixed_finger, self._widths = chain.fixed_finger, chain.object_width
-        self._usual_width = min(2.0 * cylinder.radius, chain.object_width[1])
+        self._usual_width = min(2.0 * table.object_radius, chain.object_width[1])
 
     def reach(self, position: ArrayLike, standing: Floats = NOTHING, start: RestPose | None = None) -> PlannedMotion:
         """Bring the end effector to a position with an open gripper, by the learned movement.
@@ -141,7 +141,7 @@ class ServoArmReaching:
         object is grasped below its top, one of unknown height low in every second attempt. An arm with a roll turns its
         fingers along the sides of a square foot, or along the length of an object that lies.
         """
-        grasp.check_height(self._clearance.cylinder.height)
+        grasp.check_height(self._clearance.surface.object_height)
         askew, lowered = self._askew(source, grasp), self._lowered(source, grasp)
         turned = askew if self._arm.n_joints == 5 else 0.0
         width = self._held_width(grasp, askew - turned)
@@ -203,7 +203,7 @@ class ServoArmReaching:
         hand = self._before_roll(motion.end)[1]
         if holding:
             held = here.held
-            grasped_z = self.options.table_z + self.options.low_grasp if held is None else held.z
+            grasped_z = self.options.low_grasp if held is None else held.z
             below = np.array([*hand[:2], min(hand[2], grasped_z)])
             self._put(motion, below, self._grasp_pitch(below, None if held is None else held.pitch))
         else:
@@ -430,7 +430,7 @@ class ServoArmReaching:
 
     def _lowered(self, source: ArrayLike, grasp: Grasp) -> float:
         """How far below the height of the goal the object is to be grasped, m."""
-        o, height = self.options, float(np.asarray(source, dtype=np.float64)[-1]) - self.options.table_z
+        o, height = self.options, float(np.asarray(source, dtype=np.float64)[-1])
         if grasp.height is not None:
             return max(0.0, height - max(o.low_grasp, o.grasp_share * grasp.height))
         return max(0.0, height - o.low_grasp) if grasp.attempt % 2 == 0 else 0.0
@@ -478,7 +478,6 @@ class ServoArmReaching:
 class ServoReachingOptions:
     """Sizes, m, s, m/s, deg."""
 
-    table_z: float = 0.0  # frame of the base
     pitch_deg: float = 90.0  # of the hand at the target: straight down
     reach_band_deg: tuple[float, float] = (-90.0, 120.0)
     grasp_band_deg: tuple[float, float] = (50.0, 110.0)  # further from straight down an open gripper strikes the object

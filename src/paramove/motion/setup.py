@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, model_validator
 from paramove.demonstrations import train_reaching_model
 from paramove.motion.arm_pose import ArmPoseSolver
 from paramove.motion.clear_plans import ClearPlans
-from paramove.motion.clearance import ClearanceChecker, UprightCylinder, WorkSurface
+from paramove.motion.clearance import ClearanceChecker, SurfaceParameters
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.modelled_movement import robot_movement
 from paramove.motion.plans import MotionPlans
@@ -66,26 +66,13 @@ def _cache_folder() -> Path | None:
     return folder
 
 
-class SurfaceParameters(BaseModel):
-    """A humanoid's working surface in the shoulder's frame, m, and the upright objects on any arm's."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    x: tuple[float, float] = (0.100, 0.240)
-    y: tuple[float, float] = (-0.170, 0.130)
-    z: float = -0.134
-    object_radius: float = 0.010
-    object_height: float = 0.050
-
-
 def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> MotionPlans:
     """The planner of the robot's movements, from files: of its servo arm, or of its arm on this side."""
     robot = RobotDescription.load(robot_folder)
-    cylinder = UprightCylinder(surface.object_radius, surface.object_height)
     if robot.chain is not None:
-        return ServoArmReaching(robot, movement.trained(), cylinder=cylinder)
+        return ServoArmReaching(robot, movement.trained(), surface)
     arm = robot.arm(side)
     solver = ArmPoseSolver(robot, arm)
     planner = RelocationPlanner(robot_movement(movement.trained(), solver.length), solver, robot, arm)
-    box, gripper_arm = WorkSurface(surface.x, surface.y, surface.z), GripperArm.of(robot, side)
-    return ClearPlans(gripper_arm, planner, ClearanceChecker(robot, gripper_arm, box, cylinder))
+    gripper_arm = GripperArm.of(robot, side)
+    return ClearPlans(gripper_arm, planner, ClearanceChecker(robot, gripper_arm, surface))
