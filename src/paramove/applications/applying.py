@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from paramove.applications.learning import GONE_FOR_GOOD_S
-from paramove.applications.options import Place
-from paramove.applications.stage import ApplicationState, Stage, cm
-from paramove.applications.table import AT_REST
+from paramove.applications.options import Place, cm
+from paramove.applications.stage import AT_REST, ApplicationState, Stage
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
@@ -132,7 +131,7 @@ class Applying(Stage):
         result = object_at((gesture.x, gesture.y), settled)
         if result.name:
             self._pointed_at(result.name)
-        elif app.options.surface.contains((gesture.x, gesture.y)) and set(app.rules) - app.done <= set(settled):
+        elif app.options.on_surface((gesture.x, gesture.y)) and set(app.rules) - app.done <= set(settled):
             app.speak(f"{result.doubt} Please point again.", Speech.REQUEST_POINT_AT_OBJECT)
             self.app.go("waiting")
 

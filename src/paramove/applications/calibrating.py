@@ -6,11 +6,11 @@ fetching it again each time. The image points and its own targets give the homog
 
 from __future__ import annotations
 
-from paramove.applications.options import Place
-from paramove.applications.stage import ApplicationState, Stage, cm
-from paramove.applications.table import Sighting
+from paramove.applications.conversation import position_at
+from paramove.applications.options import Place, cm
+from paramove.applications.stage import ApplicationState, Sighting, Stage
 from paramove.msgs.gesture_pb2 import Gesture
-from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.objects import HomographyError, PlaneHomography
 
@@ -32,8 +32,7 @@ class Calibrating(Stage):
     def enter(self) -> None:
         """Bring the arm to its base pose."""
         self.app.speak("I do not know yet how the camera sees the table. I will place an object at four corners.")
-        self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
-        self.app.go("resting")
+        self._rest()
 
     def on_gesture(self, gesture: Gesture) -> None:
         """Nothing: the sightings stored by the table suffice."""
@@ -56,6 +55,10 @@ class Calibrating(Stage):
     @property
     def _corner(self) -> Place:
         return self.app.options.corners[len(self._observations)]
+
+    def _rest(self) -> None:
+        self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
+        self.app.go("resting")
 
     def _resting(self) -> None:
         if self.app.goal_client.outcome is not None and self.app.options.start is not None:
@@ -89,8 +92,8 @@ class Calibrating(Stage):
 
     def _offer(self) -> None:
         assert self.app.options.offer is not None  # else there is a start
-        x, y, z = self.app.options.offer
-        self.app.goal_client.start(RelocationGoal.KIND_OFFER_HAND, self.app.now_s, source=Position(x=x, y=y, z=z))
+        offer = position_at(self.app.options.offer)
+        self.app.goal_client.start(RelocationGoal.KIND_OFFER_HAND, self.app.now_s, source=offer)
         self.app.go("offering")
 
     def _offering(self) -> None:
@@ -100,8 +103,7 @@ class Calibrating(Stage):
         elif outcome is not None and outcome.state == RelocationStatus.STATE_REJECTED:
             self._ask_for_help(f"I cannot hold my hand out: {outcome.reason}")
         elif outcome is not None:
-            self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
-            self.app.go("resting")
+            self._rest()
 
     def _ask_for_help(self, detail: str) -> None:
         """The same goal would be rejected again: only a person can change that."""
@@ -110,8 +112,7 @@ class Calibrating(Stage):
 
     def _helped(self) -> None:
         if self.app.for_s > self.app.options.ask_again_s:
-            self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
-            self.app.go("resting")
+            self._rest()
 
     def _ask(self) -> None:
         self.app.speak("Please put an object into my hand and hold it there.", Speech.REQUEST_HAND_ME_AN_OBJECT)
@@ -151,8 +152,7 @@ class Calibrating(Stage):
     def _start_again(self, reason: str) -> None:
         self._missed += 1
         self.app.speak(f"That did not work: {reason}.")
-        self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
-        self.app.go("resting")
+        self._rest()
 
     def _looking(self) -> ApplicationStage.Stage | None:
         """The arm has left: wait for a clear view of the object."""

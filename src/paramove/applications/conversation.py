@@ -33,6 +33,11 @@ class OutgoingMessages:
         self.speech.append(speech)
 
 
+def position_at(point: tuple[float, float, float]) -> Position:
+    """A position x, y, z of the gripper."""
+    return Position(x=point[0], y=point[1], z=point[2])
+
+
 class GoalClient:
     """Sends one goal after the other, each until it is acknowledged, and queries its status after a while without one.
 
@@ -64,7 +69,7 @@ class GoalClient:
 
     def position(self, place: tuple[float, float]) -> Position:
         """A position on the working plane as a position of the gripper."""
-        return Position(x=place[0], y=place[1], z=self._grasp_z)
+        return position_at((*place, self._grasp_z))
 
     def start(
         self,

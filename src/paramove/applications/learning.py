@@ -6,8 +6,8 @@ object disappears."
 
 from __future__ import annotations
 
-from paramove.applications.options import Place
-from paramove.applications.stage import ApplicationState, Stage, cm
+from paramove.applications.options import Place, cm
+from paramove.applications.stage import ApplicationState, Stage
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Rule, Rules, Speech
 
@@ -49,7 +49,7 @@ class Learning(Stage):
                 self._publish_rules()
         elif gesture.kind == Gesture.KIND_VANISHED and name in self._moved and gesture.located:
             self._moved.discard(name)
-            if self.app.options.surface.contains(place, BORDER):
+            if self.app.options.on_surface(place, BORDER):
                 self._going_in[name] = (place, gesture.captured.ToNanoseconds() * 1e-9)
 
     def step(self) -> ApplicationStage.Stage | None:

@@ -9,12 +9,22 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from paramove.applications.table import Surface
 from paramove.documents import OldNames
 
 Place = tuple[float, float]
 Range = tuple[float, float]
 Pointing = Literal["nearness", "action_space"]
+
+
+def within(place: Place, x: Range, y: Range, margin: float = 0.0) -> bool:
+    """Whether a position lies in a rectangle, `margin` inside its border."""
+    inside_x = x[0] + margin <= place[0] <= x[1] - margin
+    return inside_x and y[0] + margin <= place[1] <= y[1] - margin
+
+
+def cm(place: Place) -> str:
+    """A position as text, in centimetres."""
+    return f"({place[0] * 100:.1f}, {place[1] * 100:.1f}) cm".replace("-", "−")
 
 
 class ApplicationOptions(OldNames):
@@ -47,7 +57,7 @@ class RuleLearnerOptions(ApplicationOptions):
         corners: Where the robot places an object to learn how the camera sees its working area.
         offer: Where the open hand waits for an object: x, y, and height of the gripper.
         start: Marked position at which a person stands an object, for a hand that is not given one; goes first.
-        surface_x, surface_y: Range of the working surface.
+        surface_x, surface_y: Range of the working surface: an object that vanishes outside was carried away.
         pointing: How the object pointed at is recognised: by "nearness" of the hand, or by the target of an arm tracked
             in "action_space".
         settle_s: Time from when the arm has left until the view of an object counts.
@@ -68,10 +78,9 @@ class RuleLearnerOptions(ApplicationOptions):
             raise ValueError("neither offer nor start: give one of them, where a person brings the first object")
         return self
 
-    @property
-    def surface(self) -> Surface:
-        """The working surface."""
-        return Surface(self.surface_x, self.surface_y)
+    def on_surface(self, place: Place, margin: float = 0.0) -> bool:
+        """Whether a position lies on the surface, `margin` inside its border."""
+        return within(place, self.surface_x, self.surface_y, margin)
 
 
 class RelocatorOptions(ApplicationOptions):
@@ -114,8 +123,3 @@ class RelocatorOptions(ApplicationOptions):
     min_certainty: float = Field(0.85, ge=0, le=1)
     hand_away: float = Field(0.08, gt=0)
     hand_away_s: float = Field(0.3, ge=0)
-
-    @property
-    def area(self) -> Surface:
-        """The working area."""
-        return Surface(self.area_x, self.area_y)

@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, model_validator
 
 from paramove.applications.application import ArmWatch
-from paramove.applications.conversation import GoalClient, OutgoingMessages
+from paramove.applications.conversation import GoalClient, OutgoingMessages, position_at
 from paramove.documents import InputError
 from paramove.motion import FARTHEST_M, metres
-from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import Speech
 from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.robots import ARM_BASE
@@ -62,11 +62,11 @@ class ReachStep(BaseModel):
     def start(self, client: GoalClient, now_s: float, plan_only: bool) -> None:
         """Set it as the goal of a client."""
         if self.reach is not None:
-            client.start(RelocationGoal.KIND_OFFER_HAND, now_s, source=_position(self.reach), plan_only=plan_only)
+            client.start(RelocationGoal.KIND_OFFER_HAND, now_s, source=position_at(self.reach), plan_only=plan_only)
             return
         assert self.pick is not None
         assert self.place is not None
-        ends = _position(self.pick), _position(self.place)
+        ends = position_at(self.pick), position_at(self.place)
         client.start(RelocationGoal.KIND_RELOCATE, now_s, "", *ends, plan_only=plan_only)
 
 
@@ -181,8 +181,3 @@ class ReachTask:
         self._output.speak(self._now_s, detail, request)
         self.detail = detail
         _log.info("%.1f s: %s", self._now_s, detail)
-
-
-def _position(point: tuple[float, float, float]) -> Position:
-    x, y, z = point
-    return Position(x=x, y=y, z=z)

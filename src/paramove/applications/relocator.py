@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable
 
 from paramove.applications.application import Application
-from paramove.applications.options import Place, RelocatorOptions
-from paramove.applications.stage import cm
+from paramove.applications.conversation import position_at
+from paramove.applications.options import Place, RelocatorOptions, cm, within
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
@@ -93,9 +93,8 @@ class Relocator(Application):
             self._ask_for_help(f"I cannot bring my arm to rest: {outcome.reason}")
 
     def _fetch(self) -> None:
-        x, y, z = self._options.hold
-        source, hold = self.goal_client.position(self._object_at), Position(x=x, y=y, z=z)
-        self._start(RelocationGoal.KIND_FETCH, source, hold, 1 + self._missed)
+        source = self.goal_client.position(self._object_at)
+        self._start(RelocationGoal.KIND_FETCH, source, position_at(self._options.hold), 1 + self._missed)
         self.go("fetching")
 
     def _fetching(self) -> None:
@@ -172,7 +171,7 @@ class Relocator(Application):
     def _unfit(self, target: Place) -> str:
         """Why the object cannot be put at a position; empty if it can."""
         o = self._options
-        if not o.area.contains(target):
+        if not within(target, o.area_x, o.area_y):
             first, last = (cm(corner) for corner in zip(o.area_x, o.area_y, strict=True))
             return f"You point at {cm(target)}, which I do not reach: my working area goes from {first} to {last}."
         near = [other for other in o.standing if math.dist(other, target) < o.min_gap]

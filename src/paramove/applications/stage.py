@@ -1,17 +1,81 @@
-"""What the stages of the rule-learning application share."""
+"""What the stages of the rule-learning application share: what is seen on the table, the rules, the state."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
 
 from paramove.applications.application import Application
 from paramove.applications.options import Place, RuleLearnerOptions
-from paramove.applications.table import Table
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage
+from paramove.objects import ObjectShape
 
 REMIND_S = 6.0
 """The robot reports what it waits for if the hand stays for so long."""
+AT_REST = frozenset({Gesture.KIND_APPEARED, Gesture.KIND_RESTED})
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """The latest event of an object.
+
+    Attributes:
+        kind: Of `Gesture.Kind`: appeared, moved, rested or vanished.
+        time_s: Capture time.
+        u_px, v_px: Image point.
+        position: x, y in the plane's frame, m; None while there is no calibration.
+        shape: Of the object; None: not known.
+    """
+
+    kind: int
+    time_s: float
+    u_px: float
+    v_px: float
+    position: Place | None
+    shape: ObjectShape | None = None
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the object is detected at rest."""
+        return self.kind in AT_REST
+
+
+class Table:
+    """Stores the latest sighting of every object, of which colours there are two, and whether the hand is in view."""
+
+    def __init__(self) -> None:
+        self.objects: dict[str, Sighting] = {}
+        self.twins: set[str] = set()
+        self.hand_in_view = False
+        self.hand_changed_s = 0.0
+
+    def on_gesture(self, gesture: Gesture) -> None:
+        """Store an event."""
+        (self.twins.add if gesture.twin else self.twins.discard)(gesture.object)
+        time_s = gesture.captured.ToNanoseconds() * 1e-9
+        if gesture.kind in (Gesture.KIND_HAND_APPEARED, Gesture.KIND_HAND_VANISHED):
+            self.hand_in_view = gesture.kind == Gesture.KIND_HAND_APPEARED
+            self.hand_changed_s = time_s
+            return
+        shape = ObjectShape.of(gesture)
+        if gesture.kind == Gesture.KIND_POINTED_AT and gesture.object in self.objects:
+            self.objects[gesture.object] = replace(self.objects[gesture.object], shape=shape)
+        elif gesture.object and gesture.kind != Gesture.KIND_POINTED_AT:
+            position = (gesture.x, gesture.y) if gesture.located else None
+            self.objects[gesture.object] = Sighting(gesture.kind, time_s, gesture.u_px, gesture.v_px, position, shape)
+
+    def hand_away_for(self, now_s: float) -> float:
+        """How long the hand has been out of view, s; 0 while it is in view."""
+        return 0.0 if self.hand_in_view else now_s - self.hand_changed_s
+
+    def standing(self, but: str = "", settled_s: float = float("inf")) -> dict[str, Place]:
+        """Positions, m, of the objects at rest, without `but` and those that came to rest after `settled_s`."""
+        return {
+            name: sighting.position
+            for name, sighting in self.objects.items()
+            if sighting.at_rest and sighting.position is not None and name != but and sighting.time_s <= settled_s
+        }
 
 
 class ApplicationState(Application):
@@ -63,8 +127,3 @@ class Stage(ABC):
             app.speak("I wait, as I see a hand. Please take it, or what looks like it, out of my view.")
             app.go(app.state)
         return app.table.hand_away_for(app.now_s) > away_s
-
-
-def cm(place: Place) -> str:
-    """A position as text, in centimetres."""
-    return f"({place[0] * 100:.1f}, {place[1] * 100:.1f}) cm".replace("-", "−")

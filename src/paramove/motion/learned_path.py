@@ -7,6 +7,7 @@ deviation from it (the height of the arch above all), and the opening of the han
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -94,13 +95,11 @@ class PlacedPerson:
 
     def approach(self, target: Floats) -> LearnedPath:
         """To a target [3], frame of the base, m."""
-        turn, from_shoulder = self._relative(target)
-        return self._turned(turn, *self._movement.approach(from_shoulder))
+        return self._turned(target, self._movement.approach)
 
     def retreat(self, target: Floats) -> LearnedPath:
         """Back from a target."""
-        turn, from_shoulder = self._relative(target)
-        return self._turned(turn, *self._movement.retreat(from_shoulder))
+        return self._turned(target, self._movement.retreat)
 
     def within_training(self, target: Floats) -> bool | None:
         """Whether a target lies between the demonstrated ones."""
@@ -113,8 +112,10 @@ class PlacedPerson:
         turn = azimuth - float(np.clip(azimuth, -AHEAD, AHEAD))
         return turn, _rotation(-turn) @ (target - self._axis) + self._axis - self._shoulder
 
-    def _turned(self, turn: float, states: ArmPoses, opening: Floats) -> LearnedPath:
-        path = LearnedPath.of(states, opening, self._points)
+    def _turned(self, target: Floats, part: Callable[[Floats], tuple[ArmPoses, Floats]]) -> LearnedPath:
+        """A part of the movement to a target, by the person turned towards it."""
+        turn, from_shoulder = self._relative(target)
+        path = LearnedPath.of(*part(from_shoulder), self._points)
         return replace(path, deviation=path.deviation @ _rotation(turn).T)
 
 

@@ -115,7 +115,7 @@ class RelocationPlanner:
         self._base = self._pose_of(base[None, :5])
         self._base_opening = float((base[5] - arm.fingers_closed) / (arm.fingers_open - arm.fingers_closed))
 
-    def fetch(self, target: ArrayLike, entry_height: float | None = None, from_above: bool = False) -> PlannedMotion:
+    def fetch(self, target: Floats, entry_height: float | None = None, from_above: bool = False) -> PlannedMotion:
         """From the base pose to the object at `target`, close the hand, lift (first part of 5.2.5).
 
         Args:
@@ -123,9 +123,7 @@ class RelocationPlanner:
             entry_height: Height above t′ at which the synthesised movement ends; None for the options' one.
             from_above: Lower the open hand over the object instead of reaching from 3 cm before it.
         """
-        t = np.asarray(target, dtype=np.float64)
-        o = self.options
-        path = self._new_path()
+        t, o, path = target, self.options, self._new_path()
         before = t + o.aside * self._right(t) if from_above else self._before(t)
         grasp = t + o.grasp_aside * self._right(t)
         entry = before + (o.entry_height if entry_height is None else entry_height) * _UP
@@ -138,9 +136,9 @@ class RelocationPlanner:
 
     def deliver(
         self,
-        start: ArrayLike,
-        target: ArrayLike,
-        via: Sequence[ArrayLike] = (),
+        start: Floats,
+        target: Floats,
+        via: Sequence[Floats] = (),
         upward: bool = False,
         opened: float | None = None,
     ) -> PlannedMotion:
@@ -149,40 +147,35 @@ class RelocationPlanner:
         `upward` raises the open hand straight up afterwards instead of drawing it back; `opened` is its ξ then, None
         for the options' one.
         """
-        o = self.options
-        t = np.asarray(target, dtype=np.float64)
-        path = self._new_path()
-        here = np.asarray(start, dtype=np.float64)
-        above = t + o.lift * _UP
-        self._carry(path, here, [*via, above])
-        self._move(path, "place", [t + o.release_height * _UP], o.careful_speed, o.closed_opening, holding=True)
-        self._leave(path, t, o.closed_opening, upward, o.work_opening if opened is None else opened)
+        o, path = self.options, self._new_path()
+        self._carry(path, start, [*via, target + o.lift * _UP])
+        self._move(path, "place", [target + o.release_height * _UP], o.careful_speed, o.closed_opening, holding=True)
+        self._leave(path, target, o.closed_opening, upward, o.work_opening if opened is None else opened)
         return self._finish(path)
 
-    def hold(self, start: ArrayLike, position: ArrayLike, via: Sequence[ArrayLike] = ()) -> PlannedMotion:
+    def hold(self, start: Floats, position: Floats, via: Sequence[Floats] = ()) -> PlannedMotion:
         """Carry a held object from gripper position `start` over `via` to `position` and stay there."""
         path = self._new_path()
-        self._carry(path, np.asarray(start, dtype=np.float64), [*via, position])
+        self._carry(path, start, [*via, position])
         return self._finish(path)
 
-    def leave(self, start: ArrayLike, opening: float, upward: bool = False) -> PlannedMotion:
+    def leave(self, start: Floats, opening: float, upward: bool = False) -> PlannedMotion:
         """Open the hand where it is and go back to the base pose (last part of 5.2.5)."""
         path = self._new_path()
-        here = np.asarray(start, dtype=np.float64)
-        self._stay(path, "release", here, opening)
-        self._leave(path, here, opening, upward, self.options.work_opening)
+        self._stay(path, "release", start, opening)
+        self._leave(path, start, opening, upward, self.options.work_opening)
         return self._finish(path)
 
-    def offer(self, target: ArrayLike) -> PlannedMotion:
+    def offer(self, target: Floats) -> PlannedMotion:
         """Go to `target` with an open hand and stay there."""
         path = self._new_path()
-        self._approach(path, np.asarray(target, dtype=np.float64), self.options.offer_opening)
+        self._approach(path, target, self.options.offer_opening)
         return self._finish(path)
 
-    def fingers(self, here: ArrayLike, start: float, end: float) -> PlannedMotion:
+    def fingers(self, here: Floats, start: float, end: float) -> PlannedMotion:
         """Open or close the hand where it is."""
         path = self._new_path()
-        self._stay(path, "fingers", np.asarray(here, dtype=np.float64), start)
+        self._stay(path, "fingers", here, start)
         self._fingers(path, "fingers", start, end)
         return self._finish(path)
 
@@ -277,10 +270,10 @@ class RelocationPlanner:
             path.add(name, self._reached(here + along * (point - here)), opening, holding=holding)
             here = point
 
-    def _carry(self, path: Path, here: Floats, points: Sequence[ArrayLike]) -> None:
-        o, along = self.options, [np.asarray(point, dtype=np.float64) for point in points]
+    def _carry(self, path: Path, here: Floats, points: Sequence[Floats]) -> None:
+        o = self.options
         self._stay(path, "carry", here, o.closed_opening, holding=True)
-        self._move(path, "carry", along, o.speed, o.closed_opening, holding=True)
+        self._move(path, "carry", points, o.speed, o.closed_opening, holding=True)
 
     def _stay(self, path: Path, name: str, here: Floats, opening: float, holding: bool = False) -> None:
         path.add(name, self._reached(here[None]), opening, holding=holding)

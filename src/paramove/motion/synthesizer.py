@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
@@ -41,14 +40,6 @@ _Course = Generator[PlannedMotion, None, str]
 """Yields a motion, is resumed when it has been executed, and returns why the goal has failed; empty if it succeeded."""
 
 
-class _Hulls(NamedTuple):
-    """Whether the positions of a goal lie in the hull of the movement model's training."""
-
-    goal_id: str = ""
-    from_hull: RelocationStatus.Hull = RelocationStatus.HULL_UNSPECIFIED
-    to_hull: RelocationStatus.Hull = RelocationStatus.HULL_UNSPECIFIED
-
-
 @dataclass
 class _Running:
     """The goal being executed: its course, the current motion and its state."""
@@ -80,7 +71,7 @@ class Synthesizer:
         self._hand = ArmState(self._arm)
         self._running: _Running | None = None
         self._waiting: RelocationGoal | None = None
-        self._hulls = _Hulls()
+        self._hulls: dict[str, tuple[RelocationStatus.Hull, RelocationStatus.Hull]] = {}
         self._latest: dict[str, RelocationStatus] = {}
         self._statuses: list[RelocationStatus] = []
         self._trajectories: list[JointTrajectory] = []
@@ -248,7 +239,7 @@ class Synthesizer:
 
     def _begin_or_reject(self, goal: RelocationGoal) -> None:
         if self._running is None:
-            self._hulls = _Hulls(goal.id, hull_of(goal, "from", self._plans), hull_of(goal, "to", self._plans))
+            self._hulls = {goal.id: (hull_of(goal, "from", self._plans), hull_of(goal, "to", self._plans))}
         try:
             self._begin(goal)
         except _NO_PLAN as error:
@@ -331,8 +322,8 @@ class Synthesizer:
             goal_id=goal_id, state=state, phase=phase, reason=reason, holding=self.holding, elbow_turn_rad=elbow_turn
         )
         status.captured.FromNanoseconds(self._now_ns)
-        if self._hulls.goal_id == goal_id:
-            status.from_hull, status.to_hull = self._hulls.from_hull, self._hulls.to_hull
+        if goal_id in self._hulls:
+            status.from_hull, status.to_hull = self._hulls[goal_id]
         self._statuses.append(status)
         self._latest[goal_id] = status
         while len(self._latest) > REMEMBERED_GOALS:

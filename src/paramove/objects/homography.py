@@ -174,11 +174,8 @@ def _check_not_collinear(points: Floats, which: str) -> None:
 def _flatness(a: Floats, b: Floats, c: Floats) -> float:
     """Height over longest side of the triangle; 0 for three points of one line."""
     longest = float(max(np.linalg.norm(a - b), np.linalg.norm(b - c), np.linalg.norm(a - c)))
-    return abs(_cross(b - a, c - a)) / longest**2 if longest > 0 else 0.0
-
-
-def _cross(a: Floats, b: Floats) -> float:
-    return float(a[0] * b[1] - a[1] * b[0])
+    (x, y), (other_x, other_y) = b - a, c - a
+    return abs(float(x * other_y - y * other_x)) / longest**2 if longest > 0 else 0.0
 
 
 def _direct_linear_transform(image: Floats, plane: Floats) -> Floats:

@@ -72,16 +72,10 @@ class Recognizer:
             tracked = TrackedObjects(captured=tracked.captured, objects=usable)
         self._openings.update(tracked.openings)
         hand = next((one for one in tracked.objects if one.kind == TrackedObject.KIND_HAND), None)
-        gestures: list[Gesture] = []
-        for name, transition in self._follow_objects(tracked, hand, now_s):
-            gestures.append(self._gesture(tracked, name, transition, homography))
-        gestures += [
-            self._gesture(tracked, "", transition, homography) for transition in self._hand.update(hand, now_s)
-        ]
-        pointed_at = self._pointed_at(hand, now_s, homography)
-        if pointed_at is not None:
-            gestures.append(self._gesture(tracked, pointed_at[0], pointed_at[1], homography))
-        return gestures
+        transitions = self._follow_objects(tracked, hand, now_s)
+        transitions += [("", transition) for transition in self._hand.update(hand, now_s)]
+        transitions += self._pointed_at(hand, now_s, homography)
+        return [self._gesture(tracked, name, transition, homography) for name, transition in transitions]
 
     def _step_s(self, captured_s: float) -> float:
         """Time since the image before; 0 for one that is not newer."""
@@ -115,7 +109,7 @@ class Recognizer:
 
     def _pointed_at(
         self, hand: TrackedObject | None, now_s: float, homography: PlaneHomography | None
-    ) -> tuple[str, Transition] | None:
+    ) -> list[tuple[str, Transition]]:
         resting = {
             name: motion.position
             for name, motion in self._objects.items()
@@ -124,11 +118,10 @@ class Recognizer:
         any_moving = any(motion.state is State.MOVING for motion in self._objects.values())
         name = self._pointing.update(now_s, hand, resting, any_moving, homography)
         if name is None:
-            return None
+            return []
         position = resting[name]
-        return name, Transition(
-            Gesture.KIND_POINTED_AT, position.u_px, position.v_px, self._objects[name].visible_fraction(position)
-        )
+        visible = self._objects[name].visible_fraction(position)
+        return [(name, Transition(Gesture.KIND_POINTED_AT, position.u_px, position.v_px, visible))]
 
     def _homography(self, calibration: PlaneCalibration | None) -> PlaneHomography | None:
         if calibration is None:
