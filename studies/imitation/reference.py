@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -76,9 +76,9 @@ def reference_movement(movement: RobotMovement, solver: ArmPoseSolver, means: Fl
 def on_robot(poses: ArmPoses, solver: ArmPoseSolver, options: RelocationOptions | None = None) -> Movement:
     """What the robot's arm makes of arm poses: by the closed form alone, and within its joint limits."""
     keep_out = options or RelocationOptions()
-    plain = solver.without_limits(poses.elbow, poses.gripper, poses.finger_to_thumb)
+    plain = solver.without_limits(poses)
     gripper = solver.moved_outward(poses.gripper, keep_out.reach_margin, keep_out.reach_width)
-    limited = solver.solve(poses.elbow, gripper, poses.finger_to_thumb)
+    limited = solver.solve(replace(poses, gripper=gripper))
     return Movement(
         poses,
         RobotArm(plain.elbow, poses.gripper, plain.elbow_turn),

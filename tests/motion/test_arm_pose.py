@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
 from paramove.motion.arm_pose import ArmPoseSolver, UnreachablePoseError
+from paramove.motion.reaching_movement import ArmPoses
 from tests.motion.reaching import ARM, HOAP3, solver
 
 LOWER, UPPER = HOAP3.soft_lower[ARM.indices], HOAP3.soft_upper[ARM.indices]
@@ -28,6 +30,11 @@ def random_angles(seed: int) -> np.ndarray:
     lower[1], upper[3] = np.deg2rad([-85.0, -5.0])
     margin = np.deg2rad(2.0)
     return np.random.default_rng(seed).uniform(lower + margin, upper - margin)
+
+
+def arm_poses(elbow: ArrayLike, gripper: ArrayLike, fingers: ArrayLike) -> ArmPoses:
+    """Of K poses, or of one."""
+    return ArmPoses(*(np.atleast_2d(np.asarray(part, dtype=np.float64)) for part in (elbow, gripper, fingers)))
 
 
 def random_pose(seed: int) -> Pose:
@@ -57,7 +64,7 @@ def keeps_limits(pose: Pose, turns: np.ndarray) -> np.ndarray:
     """Whether the arm breaks no limit if the elbow is turned by each of the angles, [K]."""
     elbow, gripper, fingers = pose
     many = (np.tile(gripper, (len(turns), 1)), np.tile(fingers, (len(turns), 1)))
-    angles = unlimited().solve(turned(elbow, gripper, turns), *many).angles
+    angles = unlimited().solve(arm_poses(turned(elbow, gripper, turns), *many)).angles
     return np.asarray(((angles >= LOWER + MARGIN) & (angles <= UPPER - MARGIN)).all(axis=1))
 
 
@@ -67,7 +74,7 @@ def test_is_the_inverse_of_forward_kinematics(seed: int) -> None:
     angles = random_angles(seed)
     points = ARM.kinematics.forward(angles)
     assume(np.linalg.norm(points.gripper) > solver().reach[0])
-    found = solver().solve(points.elbow, points.gripper, points.shoulder_from_hand[:, 1])
+    found = solver().solve(arm_poses(points.elbow, points.gripper, points.shoulder_from_hand[:, 1]))
     np.testing.assert_allclose(found.angles[0], angles, rtol=0, atol=1e-6)
     np.testing.assert_allclose(found.elbow[0], points.elbow, rtol=0, atol=1e-9)
     assert found.elbow_turn[0] == 0.0
@@ -78,7 +85,7 @@ def test_is_the_inverse_of_forward_kinematics(seed: int) -> None:
 def test_gripper_is_exact_and_every_joint_keeps_its_limits(seed: int) -> None:
     """The gripper site lies 6 mm beside the forearm's axis; nothing of that is lost."""
     elbow, gripper, fingers = random_pose(seed)
-    found = solver().solve(elbow, gripper, fingers)
+    found = solver().solve(arm_poses(elbow, gripper, fingers))
     points = ARM.kinematics.forward(found.angles[0])
     np.testing.assert_allclose(points.gripper, gripper, rtol=0, atol=1e-9)
     np.testing.assert_allclose(points.elbow, found.elbow[0], rtol=0, atol=1e-9)
@@ -91,7 +98,7 @@ def test_gripper_is_exact_and_every_joint_keeps_its_limits(seed: int) -> None:
 def test_without_a_broken_limit_the_elbow_is_that_of_the_thesis(seed: int) -> None:
     """q' lies in the plane of shoulder, person's elbow and gripper, on the elbow's side (5.10): no other is nearer."""
     elbow, gripper, fingers = random_pose(seed)
-    found = solver().solve(elbow, gripper, fingers)
+    found = solver().solve(arm_poses(elbow, gripper, fingers))
     assume(found.elbow_turn[0] == 0.0)
     normal = np.cross(elbow, gripper)
     assume(np.linalg.norm(normal) > 1e-4)
@@ -105,7 +112,7 @@ def test_without_a_broken_limit_the_elbow_is_that_of_the_thesis(seed: int) -> No
 @given(seeds)
 def test_where_a_limit_is_broken_the_smallest_turn_is_used(seed: int) -> None:
     pose = random_pose(seed)
-    turn = abs(float(solver().solve(*pose).elbow_turn[0]))
+    turn = abs(float(solver().solve(arm_poses(*pose)).elbow_turn[0]))
     step = np.deg2rad(0.1)
     grid = np.arange(-np.pi, np.pi, step)
     smallest = np.abs(grid[keeps_limits(pose, grid)]).min()
@@ -114,7 +121,7 @@ def test_where_a_limit_is_broken_the_smallest_turn_is_used(seed: int) -> None:
 
 def refusal_of(pose: Pose) -> str:
     try:
-        solver().solve(*pose)
+        solver().solve(arm_poses(*pose))
     except UnreachablePoseError as error:
         return str(error)
     return ""
@@ -139,7 +146,7 @@ def test_a_sequence_is_turned_to_one_side() -> None:
     steps = np.linspace(0.0, 1.0, 60)
     gripper = np.array([0.16, -0.06, -0.07]) + steps[:, None] * np.array([0.0, 0.12, 0.0])
     elbow = np.column_stack([0.02 + 0.0 * steps, 0.10 - 0.02 * steps, -0.02 + 0.0 * steps])
-    found = solver().solve(elbow, gripper, np.tile([0.0, 1.0, 0.0], (60, 1)))
+    found = solver().solve(arm_poses(elbow, gripper, np.tile([0.0, 1.0, 0.0], (60, 1))))
     assert found.elbow_turn.any(), "the case shall need turns"
     assert np.abs(np.diff(found.elbow_turn)).max() < np.deg2rad(20)
     points = ARM.kinematics.forward(found.angles)
@@ -151,8 +158,8 @@ def test_a_smoothed_turn_keeps_gripper_limits_and_ends() -> None:
     gripper = np.array([0.17, -0.10, -0.06]) + steps[:, None] * np.array([0.0, 0.17, -0.03])
     elbow = np.column_stack([0.0 * steps + 0.03, -0.05 + 0.08 * np.sin(np.pi * steps) ** 2, 0.0 * steps - 0.10])
     fingers = np.tile([0.0, 1.0, 0.0], (200, 1))
-    sharp = solver().solve(elbow, gripper, fingers, 1.0)
-    smooth = solver().solve(elbow, gripper, fingers, 1.0, smoothing=15)
+    sharp = solver().solve(arm_poses(elbow, gripper, fingers), 1.0)
+    smooth = solver().solve(arm_poses(elbow, gripper, fingers), 1.0, smoothing=15)
     assert sharp.elbow_turn.any()
     assert not sharp.elbow_turn.all()
     assert np.abs(np.diff(smooth.elbow_turn, 2)).max() < np.abs(np.diff(sharp.elbow_turn, 2)).max()
@@ -167,7 +174,7 @@ def test_the_forearm_slopes_as_asked_and_the_hand_is_level(slope_deg: float) -> 
     places = np.array([[0.14, -0.09, -0.09], [0.15, -0.03, -0.09], [0.18, -0.06, -0.08], [0.17, -0.08, -0.05]])
     elbow = np.tile([0.03, -0.05, -0.09], (len(places), 1))
     fingers = np.tile([0.3, 0.8, -0.4], (len(places), 1))
-    found = solver().solve(elbow, places, fingers, level=1.0, slope=np.deg2rad(slope_deg))
+    found = solver().solve(arm_poses(elbow, places, fingers), level=1.0, slope=np.deg2rad(slope_deg))
     free = found.elbow_turn == 0.0
     assert free.sum() >= 2, "some of the places shall need no further turn"
     points = ARM.kinematics.forward(found.angles)
@@ -181,10 +188,10 @@ def test_the_forearm_slopes_as_asked_and_the_hand_is_level(slope_deg: float) -> 
 def test_the_share_of_the_level_goes_from_the_persons_hand_to_the_level_one() -> None:
     gripper = np.tile([0.16, -0.06, -0.07], (3, 1))
     elbow, fingers = np.tile([0.03, -0.05, -0.09], (3, 1)), np.tile([0.2, 0.8, -0.5], (3, 1))
-    found = solver().solve(elbow, gripper, fingers, level=[0.0, 0.5, 1.0], slope=0.25)
+    found = solver().solve(arm_poses(elbow, gripper, fingers), level=[0.0, 0.5, 1.0], slope=0.25)
     tilt = np.abs(ARM.kinematics.forward(found.angles).shoulder_from_hand[:, 2, 1])
     assert tilt[0] > tilt[1] > tilt[2]
-    person = solver().solve(elbow[0], gripper[0], fingers[0])
+    person = solver().solve(arm_poses(elbow[0], gripper[0], fingers[0]))
     np.testing.assert_allclose(found.angles[0], person.angles[0], rtol=0, atol=1e-12)
 
 
@@ -195,7 +202,7 @@ def test_a_person_whose_arm_gives_no_plane_still_gives_an_exact_gripper(
 ) -> None:
     """Elbow on the line to the gripper, or no direction of the fingers: the elbow hangs and the hand is level."""
     gripper = np.array([0.16, -0.06, -0.07])
-    found = solver().solve(elbow, gripper, fingers)
+    found = solver().solve(arm_poses(elbow, gripper, fingers))
     np.testing.assert_allclose(ARM.kinematics.forward(found.angles[0]).gripper, gripper, rtol=0, atol=1e-9)
 
 
@@ -214,7 +221,7 @@ def test_a_person_whose_arm_gives_no_plane_still_gives_an_exact_gripper(
 def test_what_cannot_be_reached_is_refused_with_the_reason(gripper: tuple[float, ...], words: str) -> None:
     elbow, fingers = np.tile([0.02, -0.03, -0.10], (2, 1)), np.tile([0.0, 1.0, 0.0], (2, 1))
     with pytest.raises(UnreachablePoseError, match=words):
-        solver().solve(elbow, [(0.16, -0.06, -0.07), gripper], fingers)
+        solver().solve(arm_poses(elbow, [(0.16, -0.06, -0.07), gripper], fingers))
 
 
 def test_reach_is_that_of_the_arm_with_its_elbow_at_the_limits() -> None:
@@ -237,11 +244,11 @@ def test_a_gripper_outside_the_plane_of_the_hand_needs_another_solver() -> None:
 def test_the_closed_form_says_by_how_much_it_breaks_limits(seed: int) -> None:
     """It is what `solve` gives where no limit is broken, and outside the limits exactly where `solve` turns."""
     elbow, gripper, fingers = random_pose(seed)
-    plain = solver().without_limits(elbow, gripper, fingers)
+    plain = solver().without_limits(arm_poses(elbow, gripper, fingers))
     outside = solver().outside_limits(plain.angles)[0]
     np.testing.assert_allclose(ARM.kinematics.forward(plain.angles[0]).gripper, gripper, rtol=0, atol=1e-9)
     try:
-        kept = solver().solve(elbow, gripper, fingers)
+        kept = solver().solve(arm_poses(elbow, gripper, fingers))
     except UnreachablePoseError:
         assert outside.max() > 0.0
         return

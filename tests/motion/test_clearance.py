@@ -14,6 +14,7 @@ from paramove.motion.clearance import (
 )
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.plans import MAX_STANDING
+from paramove.motion.reaching_movement import ArmPoses
 from paramove.robots import RobotDescription
 from tests.motion.reaching import ARM, HOAP3, JOINTS, RIGHT, SURFACE, at, checker, planner, solver
 from tests.robots.servo_arms import ARMS, ArmModel
@@ -24,7 +25,8 @@ each_servo_arm = pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.
 def over_the_surface(height: float) -> np.ndarray:
     """Arm joints and half-open fingers with a level hand, the gripper `height` above the working plane, [1, 6]."""
     gripper = np.array([[0.165, -0.05, SURFACE.z + height]])
-    found = solver().solve([[0.03, -0.05, -0.09]], gripper, [[0.0, 1.0, 0.0]], level=1.0, slope=0.25)
+    pose = ArmPoses(np.array([[0.03, -0.05, -0.09]]), gripper, np.array([[0.0, 1.0, 0.0]]))
+    found = solver().solve(pose, level=1.0, slope=0.25)
     return np.column_stack([found.angles, [0.0]])
 
 

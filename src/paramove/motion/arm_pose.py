@@ -6,13 +6,14 @@ gripper site (the centre of a held cylinder) lies next to the forearm's axis; th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from paramove.documents import Floats
+from paramove.motion.reaching_movement import ArmPoses
 from paramove.robots import Arm, RobotDescription
 
 # The elbow is turned on this grid, then refined by bisection to a hundredth of a step.
@@ -88,9 +89,7 @@ class ArmPoseSolver:
 
     def solve(
         self,
-        elbow: ArrayLike,
-        gripper: ArrayLike,
-        finger_to_thumb: ArrayLike,
+        poses: ArmPoses,
         level: ArrayLike = 0.0,
         slope: float | None = None,
         smoothing: int = 0,
@@ -102,9 +101,8 @@ class ArmPoseSolver:
         is kept, so that the elbow never jumps.
 
         Args:
-            elbow: The person's elbow scaled to the robot, [K, 3], m, shoulder frame.
-            gripper: Where the gripper site shall be, [K, 3].
-            finger_to_thumb: Direction from index finger to thumb (o of 5.2.3), [K, 3].
+            poses: The person's elbow scaled to the robot, where the gripper site shall be, and the direction from index
+                finger to thumb.
             level: Fraction 0 to 1, [K] or one, by which o is replaced by the direction o′ that aligns the hand to the
                 table plane, thumb on the left (5.2.5).
             slope: Angle by which the forearm shall slope down, rad: by the fraction `level` the elbow is turned towards
@@ -114,21 +112,20 @@ class ArmPoseSolver:
         Raises:
             UnreachablePoseError: A gripper point is out of reach, or no turn of the elbow keeps the joint limits.
         """
-        q, r, o = (np.atleast_2d(np.asarray(a, dtype=np.float64)) for a in (elbow, gripper, finger_to_thumb))
-        self._check_reach(r)
-        fraction = np.broadcast_to(np.asarray(level, dtype=np.float64), r.shape[:1])
-        poses = _Poses(q if slope is None else self._sloped(q, r, slope, fraction), r, o, fraction)
-        solution = self._one_sided(poses, self._nearest(poses, _TURNS_BOTH))
-        return self._smoothed(poses, solution, smoothing) if smoothing else solution
+        self._check_reach(poses.gripper)
+        fraction = np.broadcast_to(np.asarray(level, dtype=np.float64), len(poses))
+        if slope is not None:
+            poses = replace(poses, elbow=self._sloped(poses.elbow, poses.gripper, slope, fraction))
+        solution = self._one_sided(poses, fraction, self._nearest(poses, fraction, _TURNS_BOTH))
+        return self._smoothed(poses, fraction, solution, smoothing) if smoothing else solution
 
-    def without_limits(self, elbow: ArrayLike, gripper: ArrayLike, finger_to_thumb: ArrayLike) -> JointSolution:
-        """The closed form of 5.2.4 as it is, whether or not the joints reach it; arguments as for `solve`.
+    def without_limits(self, poses: ArmPoses) -> JointSolution:
+        """The closed form of 5.2.4 as it is, whether or not the joints reach it; poses as for `solve`.
 
         The gripper's distance from the shoulder is taken to close the triangle of the arm.
         """
-        q, r, o = (np.atleast_2d(np.asarray(a, dtype=np.float64)) for a in (elbow, gripper, finger_to_thumb))
-        straight_on = np.zeros(len(r))
-        return JointSolution(*self._pose(_Poses(q, r, o, straight_on), straight_on), straight_on)
+        zero = np.zeros(len(poses))
+        return JointSolution(*self._pose(poses, zero, zero), zero)
 
     def outside_limits(self, angles: Floats) -> Floats:
         """By how much each joint of angles [K, 5] lies outside the limits that `solve` keeps, rad; 0 inside."""
@@ -147,7 +144,7 @@ class ArmPoseSolver:
         pressed = np.where(pressed < low, low + room * np.tanh((pressed - low) / room), pressed)
         return np.asarray(np.where(over, pressed, angles))
 
-    def _smoothed(self, poses: _Poses, solution: JointSolution, smoothing: int) -> JointSolution:
+    def _smoothed(self, poses: ArmPoses, level: Floats, solution: JointSolution, smoothing: int) -> JointSolution:
         """The turn begun a little earlier and ended later, so that the elbow does not jerk; limits still hold."""
         turn = solution.elbow_turn
         if not turn.any():
@@ -157,16 +154,16 @@ class ArmPoseSolver:
         smooth = sign * gaussian_filter1d(wider, smoothing / 2.0, mode="nearest", truncate=2.0)
         ends = np.minimum(np.arange(len(turn)), np.arange(len(turn))[::-1])
         smooth = np.where(ends < smoothing, turn + np.clip(ends / smoothing, 0.0, 1.0) ** 2 * (smooth - turn), smooth)
-        angles, q_set = self._pose(poses, smooth)
+        angles, q_set = self._pose(poses, level, smooth)
         return JointSolution(angles, q_set, smooth) if (self._excess(angles) <= 0.0).all() else solution
 
-    def _one_sided(self, poses: _Poses, solution: JointSolution) -> JointSolution:
+    def _one_sided(self, poses: ArmPoses, level: Floats, solution: JointSolution) -> JointSolution:
         turn = solution.elbow_turn
         if np.any(np.abs(np.diff(turn)) > _JUMP) and turn.min() < 0.0 < turn.max():
             one_sided = []
             for side in (1.0, -1.0):
                 try:
-                    one_sided.append(self._nearest(poses, side * _TURNS))
+                    one_sided.append(self._nearest(poses, level, side * _TURNS))
                 except UnreachablePoseError:
                     continue
             if one_sided:
@@ -185,30 +182,32 @@ class ArmPoseSolver:
                 f"the arm reaches {minimum * 100:.1f} to {maximum * 100:.1f} cm"
             )
 
-    def _nearest(self, poses: _Poses, turns: Floats) -> JointSolution:
+    def _nearest(self, poses: ArmPoses, level: Floats, turns: Floats) -> JointSolution:
         """The first of `turns` (sorted by size) that breaks no limit, refined; only poses that need a turn search."""
-        best = np.zeros(len(poses.r))
-        angles, _ = self._pose(poses, best)
+        best = np.zeros(len(poses))
+        angles, _ = self._pose(poses, level, best)
         stuck = np.flatnonzero(self._excess(angles) > 0.0)
         if stuck.size:
-            some = poses.of(stuck)
-            excess = np.stack([self._excess(self._pose(some, np.full(stuck.size, turn))[0]) for turn in turns], axis=1)
+            some, levels = poses[stuck], level[stuck]
+            excess = np.stack(
+                [self._excess(self._pose(some, levels, np.full(stuck.size, turn))[0]) for turn in turns], axis=1
+            )
             good = excess <= 0.0  # [K, S]
             if not good.any(axis=1).all():
                 k = int(stuck[np.flatnonzero(~good.any(axis=1))[0]])
                 raise UnreachablePoseError(
-                    f"pose {k}: gripper at {_cm(poses.r[k])} cm breaks {self._broken(angles[k])} "
+                    f"pose {k}: gripper at {_cm(poses.gripper[k])} cm breaks {self._broken(angles[k])} "
                     "and another limit wherever the elbow is turned"
                 )
-            best[stuck] = self._refine(some, turns[np.argmax(good, axis=1)])
-        angles, q_set = self._pose(poses, best)
+            best[stuck] = self._refine(some, levels, turns[np.argmax(good, axis=1)])
+        angles, q_set = self._pose(poses, level, best)
         return JointSolution(angles, q_set, best)
 
-    def _refine(self, poses: _Poses, turn: Floats) -> Floats:
+    def _refine(self, poses: ArmPoses, level: Floats, turn: Floats) -> Floats:
         good, bad = turn.copy(), turn - _TURNS[1] * np.sign(turn)
         for _ in range(_BISECTIONS):
             middle = 0.5 * (good + bad)
-            inside = self._excess(self._pose(poses, middle)[0]) <= 0.0
+            inside = self._excess(self._pose(poses, level, middle)[0]) <= 0.0
             good, bad = np.where(inside, middle, good), np.where(inside, bad, middle)
         return good
 
@@ -224,12 +223,13 @@ class ArmPoseSolver:
         low, high, angle = np.rad2deg([self._lower[worst], self._upper[worst], angles[worst]])
         return f"the limit of {self._joints[worst]} ({angle:.1f} deg, allowed {low:.1f} to {high:.1f})"
 
-    def _pose(self, poses: _Poses, turn: Floats) -> tuple[Floats, Floats]:
+    def _pose(self, poses: ArmPoses, level: Floats, turn: Floats) -> tuple[Floats, Floats]:
         """Angles [K, 5] and elbow [K, 3] for the elbow of 5.2.4 turned by `turn` [K]."""
-        q = self._elbow(poses.q, poses.r, turn)
-        o = poses.o / np.maximum(np.linalg.norm(poses.o, axis=-1, keepdims=True), _NEARLY_STRAIGHT)
-        fraction = poses.level[:, None]
-        forearm, aside = self._hand(q, poses.r, (1.0 - fraction) * o + fraction * _level(q, poses.r))
+        r, o = poses.gripper, poses.finger_to_thumb
+        q = self._elbow(poses.elbow, r, turn)
+        o = o / np.maximum(np.linalg.norm(o, axis=-1, keepdims=True), _NEARLY_STRAIGHT)
+        fraction = level[:, None]
+        forearm, aside = self._hand(q, r, (1.0 - fraction) * o + fraction * _level(q, r))
         return _angles(q / self._upper_arm, forearm, aside), q
 
     def _elbow(self, q: Floats, r: Floats, turn: Floats) -> Floats:
@@ -280,19 +280,6 @@ class ArmPoseSolver:
         y = sine * d + np.sqrt(1.0 - sine**2) * across
         b = (length * d - self._aside * y) / self._along  # (5.23) corrected: from the robot's elbow
         return b, y
-
-
-@dataclass(frozen=True)
-class _Poses:
-    """Elbow, gripper, finger to thumb [K, 3] and level [K]."""
-
-    q: Floats
-    r: Floats
-    o: Floats
-    level: Floats
-
-    def of(self, indices: NDArray[np.intp]) -> _Poses:
-        return _Poses(self.q[indices], self.r[indices], self.o[indices], self.level[indices])
 
 
 def _level(q: Floats, r: Floats) -> Floats:

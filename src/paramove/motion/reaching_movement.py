@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from paramove.documents import Floats
 
@@ -28,7 +28,7 @@ class ArmPoses:
     def __len__(self) -> int:
         return len(self.gripper)
 
-    def __getitem__(self, states: slice) -> ArmPoses:
+    def __getitem__(self, states: slice | NDArray[np.intp]) -> ArmPoses:
         return ArmPoses(self.elbow[states], self.gripper[states], self.finger_to_thumb[states])
 
     def stacked(self) -> Floats:

@@ -7,7 +7,7 @@ is kept and only the parameter t varies.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -230,8 +230,7 @@ class RelocationPlanner:
         curve = CubicSpline(at, columns, axis=0, bc_type="clamped")
         n = max(2, round(duration / path.period))
         values = curve(soft_ends(np.arange(1, n + 1) / n))
-        poses = ArmPoses.from_stacked(values[:, :9])
-        poses = ArmPoses(poses.elbow, self._outward(poses.gripper), poses.finger_to_thumb)
+        poses = self._outward(ArmPoses.from_stacked(values[:, :9]))
         path.add(name, poses, np.clip(values[:, 9], 0.0, 1.0), np.clip(values[:, 10], 0.0, 1.0))
 
     @property
@@ -242,7 +241,7 @@ class RelocationPlanner:
     def _way_to_table(self, path: Path, name: str, begin: ArmPoses, backwards: bool = False) -> None:
         """From the base pose to where the movement begins, or back: no movement of people, who sit at the table."""
         o = self.options
-        first = self.solver.solve(begin.elbow, self._outward(begin.gripper), begin.finger_to_thumb).angles[0]
+        first = self.solver.solve(self._outward(begin)).angles[0]
         corners = np.concatenate([self.base_angles[None, :5], self._above_table.via, first[None]])
         at = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(corners, axis=0)).max(axis=1))])
         n = max(2, round(o.raise_duration / path.period))
@@ -254,9 +253,10 @@ class RelocationPlanner:
         minimum = self.solver.reach[0] + self.options.reach_margin + self.options.reach_width
         return point * max(1.0, minimum / float(np.linalg.norm(point)))
 
-    def _outward(self, gripper: Floats) -> Floats:
-        """The path with points nearer to the shoulder than the elbow can bend moved outward; the rest stays."""
-        return self.solver.moved_outward(gripper, self.options.reach_margin, self.options.reach_width)
+    def _outward(self, poses: ArmPoses) -> ArmPoses:
+        """The same with grippers nearer to the shoulder than the elbow can bend moved outward; the rest stays."""
+        o = self.options
+        return replace(poses, gripper=self.solver.moved_outward(poses.gripper, o.reach_margin, o.reach_width))
 
     def _move(
         self, path: Path, name: str, points: Sequence[Floats], speed: float, opening: float, holding: bool = False
@@ -290,7 +290,7 @@ class RelocationPlanner:
         """Poses of state T in which the gripper is at the given points [K, 3]."""
         m = self.movement
         poses = m.poses_of_state(m.reach_state, m.parameter_for(m.reach_state, gripper))
-        return ArmPoses(poses.elbow, gripper, poses.finger_to_thumb)
+        return replace(poses, gripper=gripper)
 
     def _right(self, target: Floats) -> Floats:
         """b′⊥ of 5.2.5: level, to the right of the forearm when the gripper is at `target`."""
@@ -300,7 +300,7 @@ class RelocationPlanner:
     def _forward(self, target: Floats) -> Floats:
         """b′ of 5.2.5: the forearm's direction projected onto the table plane."""
         pose = self._reached(target[None])
-        solution = self.solver.solve(pose.elbow, pose.gripper, pose.finger_to_thumb, 1.0, self.options.work_slope)
+        solution = self.solver.solve(pose, 1.0, self.options.work_slope)
         b = (pose.gripper - solution.elbow)[0] * [1.0, 1.0, 0.0]
         return np.asarray(b / np.linalg.norm(b))
 
@@ -314,7 +314,7 @@ class RelocationPlanner:
         if not self.movement.begins_above_table:
             return self._blended(states, self._base, o.blend_share)
         gripper = np.clip(states.gripper[:1], self._above_table.lowest, self._above_table.highest)
-        return self._blended(states, ArmPoses(states.elbow[:1], gripper, states.finger_to_thumb[:1]), 1.0)
+        return self._blended(states, replace(states[:1], gripper=gripper), 1.0)
 
     def _blended(self, states: ArmPoses, first: ArmPoses, fraction: float) -> ArmPoses:
         """The movement started from another pose, which fades out over the first `fraction`."""
@@ -332,9 +332,7 @@ class RelocationPlanner:
         poses = ArmPoses.from_stacked(np.concatenate([part.stacked() for part in path.poses]))
         opening, level = np.concatenate(path.opening), np.concatenate(path.level)
         smoothing = round(self.options.turn_smoothing / path.period)
-        solution = self.solver.solve(
-            poses.elbow, poses.gripper, poses.finger_to_thumb, level, self.options.work_slope, smoothing
-        )
+        solution = self.solver.solve(poses, level, self.options.work_slope, smoothing)
         closed, opened = self.arm.fingers_closed, self.arm.fingers_open
         fingers = closed + opening * (opened - closed)
         angles = np.concatenate([solution.angles, fingers[:, None]], axis=1)
