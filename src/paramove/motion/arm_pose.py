@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from paramove.documents import Floats
+from paramove.motion.plans import centimetres
 from paramove.motion.reaching_movement import ArmPoses
 from paramove.robots import Arm, RobotDescription
 
@@ -178,7 +179,7 @@ class ArmPoseSolver:
         if bad.size:
             k = int(bad[0])
             raise UnreachablePoseError(
-                f"pose {k}: gripper at {_cm(r[k])} cm is {distance[k] * 100:.1f} cm from the shoulder; "
+                f"pose {k}: gripper at {centimetres(r[k])} is {distance[k] * 100:.1f} cm from the shoulder; "
                 f"the arm reaches {minimum * 100:.1f} to {maximum * 100:.1f} cm"
             )
 
@@ -196,7 +197,7 @@ class ArmPoseSolver:
             if not good.any(axis=1).all():
                 k = int(stuck[np.flatnonzero(~good.any(axis=1))[0]])
                 raise UnreachablePoseError(
-                    f"pose {k}: gripper at {_cm(poses.gripper[k])} cm breaks {self._broken(angles[k])} "
+                    f"pose {k}: gripper at {centimetres(poses.gripper[k])} breaks {self._broken(angles[k])} "
                     "and another limit wherever the elbow is turned"
                 )
             best[stuck] = self._refine(some, levels, turns[np.argmax(good, axis=1)])
@@ -314,7 +315,3 @@ def _rotated(v: Floats, axis: int, angle: Floats) -> Floats:
     turned[..., first] = c * v[..., first] - s * v[..., second]
     turned[..., second] = s * v[..., first] + c * v[..., second]
     return turned
-
-
-def _cm(point: Floats) -> str:
-    return "(" + ", ".join(f"{v * 100:.1f}" for v in point) + ")"

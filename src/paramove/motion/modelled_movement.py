@@ -16,6 +16,7 @@ from scipy.spatial import Delaunay, QhullError
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.conversion import RobotMovement, arm_of, grasp_states, points_of
+from paramove.motion.plans import centimetres
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.motion.timing import minimum_jerk
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParametricHMM
@@ -132,10 +133,9 @@ class ModelledMovement(ReachingMovement):
         return tried, left
 
     def _no_parameter_message(self, target: Floats, missed: float) -> str:
-        x, y, z = 100.0 * target
         description = self._model.description or MovementDescription()
         return (
-            f"no movement of the model {description.action!r} brings the gripper to ({x:.1f}, {y:.1f}, {z:.1f}) cm, "
+            f"no movement of the model {description.action!r} brings the gripper to {centimetres(target)}, "
             f"the nearest is {100 * missed:.1f} cm away; its training reached no such position, and a linear "
             "model extrapolates farther than others"
         )

@@ -180,6 +180,11 @@ class MotionPlans(Protocol):
         """Whether the movement model was trained around this position; None if that is not known."""
 
 
+def centimetres(point: Floats) -> str:
+    """A position as text, in cm."""
+    return f"({', '.join(f'{value * 100:.1f}' for value in point)}) cm"
+
+
 def metres(point: Floats) -> str:
     """A position as text, in m."""
     return f"({', '.join(f'{value:.3f}' for value in point)}) m"

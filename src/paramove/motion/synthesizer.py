@@ -13,7 +13,16 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.arm_state import ArmState
-from paramove.motion.plans import FARTHEST_M, Grasp, MisfitError, MotionPlans, NoPlanError, PlannedMotion, RestPose
+from paramove.motion.plans import (
+    FARTHEST_M,
+    Grasp,
+    MisfitError,
+    MotionPlans,
+    NoPlanError,
+    PlannedMotion,
+    RestPose,
+    centimetres,
+)
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPhase, TrajectoryPoint, TrajectoryStatus
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.robots import OutOfReachError
@@ -198,7 +207,7 @@ class Synthesizer:
         if not self.holding:
             felt = self._hand.felt
             yield self._plans.leave(fetch.end, self._hand.opening, standing)
-            return f"felt nothing in the hand at {centimetres(source)} cm: {felt}"
+            return f"felt nothing in the hand at {centimetres(source[:2])}: {felt}"
         yield onwards
         return self._placed(target)
 
@@ -234,7 +243,7 @@ class Synthesizer:
 
     def _placed(self, target: Floats) -> str:
         if self._hand.lost:
-            return f"the object slipped out of the hand on the way to {centimetres(target)} cm"
+            return f"the object slipped out of the hand on the way to {centimetres(target[:2])}"
         return ""
 
     def _begin_or_reject(self, goal: RelocationGoal) -> None:
@@ -407,11 +416,6 @@ def standing_of(goal: RelocationGoal) -> Floats:
     if not np.isfinite(positions).all() or np.abs(positions).max(initial=0.0) > LARGEST:
         raise GoalRejectedError(f"the positions to avoid are {positions.tolist()}; finite numbers in m are needed")
     return positions[:, :2]
-
-
-def centimetres(point: Floats) -> str:
-    """A position as text, in cm."""
-    return f"({point[0] * 100:.1f}, {point[1] * 100:.1f})"
 
 
 def motion_message(name: str, joints: Sequence[str], motion: PlannedMotion, now_ns: int) -> JointTrajectory:
