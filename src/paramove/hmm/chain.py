@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from paramove.documents import Floats, Ints
 from paramove.hmm import chain_kernels
-from paramove.hmm.covariances import Covariance, covariances_of, log_prior
-from paramove.hmm.estimation import Moments, whitened
+from paramove.hmm.estimation import Covariance, Moments, covariances_of, log_prior, whitened
 from paramove.hmm.gaussians import stacked_log_outputs, stacked_moments
 from paramove.hmm.options import Regularisation
 from paramove.hmm.sequences import Stack
@@ -194,7 +193,6 @@ class ChainStatistics(Moments):
     """Pooled sufficient statistics of a chain."""
 
     counts: Counts
-    log_likelihood: float
 
     @classmethod
     def of(
@@ -205,7 +203,7 @@ class ChainStatistics(Moments):
         moments = Moments.none(parameters.means)
         n_states = len(parameters.means)
         counts = Counts(np.zeros(n_states), np.zeros((n_states, n_states)), np.zeros(n_states))
-        log_likelihood, before = 0.0, 0
+        before = 0
         for stack in stacks:
             values, gamma, expected = evaluator.expectation(stack)
             if not np.isfinite(values).all():
@@ -214,19 +212,16 @@ class ChainStatistics(Moments):
                     f"the model gives sequence {index} the likelihood zero: no path has its length and frames; "
                     "leave it out or train with duration_pseudocount > 0"
                 )
-            moments = moments.plus(
-                *stacked_moments(
-                    stack.columns, evaluator.windows(stack), gamma, parameters.means[None], kind == "diagonal"
-                )
-            )
+            windows = evaluator.windows(stack)
+            sums = stacked_moments(stack.columns, windows, gamma, parameters.means[None], kind == "diagonal")
+            moments = moments.plus(*sums, values)
             counts = Counts(
                 counts.starts + expected.starts,
                 counts.transitions + expected.transitions,
                 counts.exits + expected.exits,
             )
-            log_likelihood += float(values.sum())
             before += len(values)
-        return cls(moments.reference, moments.weight, moments.first, moments.second, counts, log_likelihood)
+        return cls(**vars(moments), counts=counts)
 
 
 def maximised(

@@ -6,30 +6,18 @@ Corrected 2.2.3.2: the statistics of tied sub-states are pooled; with explicit d
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from paramove.documents import Floats, Ints
 from paramove.hmm import kernels
-from paramove.hmm.covariances import Covariance, covariances_of, floored, log_prior, pooled_covariance
 from paramove.hmm.gaussians import whitening_of
 from paramove.hmm.options import Regularisation
 from paramove.hmm.sequences import Stack
 
-__all__ = [
-    "Evaluator",
-    "Moments",
-    "Parameters",
-    "Statistics",
-    "covariances_of",
-    "durations_of",
-    "floored",
-    "penalty",
-    "pooled_covariance",
-    "whitened",
-]
-
+Covariance = Literal["full", "diagonal", "tied"]
 UNSEEN = 1e-20  # frames; responsibilities below 1e-30 are left out of the moments
 
 
@@ -90,17 +78,20 @@ class Evaluator:
         """Feasible numbers of frames used after each state. Shape (N + 1, 2)."""
         return kernels.feasible_ends(len(self.means), self.d_min, self.log_duration.shape[1], n_frames)
 
-    def log_outputs(self, sequence: Floats) -> Floats:
-        """ln b_i(x_t) of the feasible pairs; other entries are undefined. Shape (N, T)."""
-        stack = Stack.of([sequence])
-        windows = self.windows(stack)
+    def log_outputs(self, stack: Stack, diagonal: bool = False, means: Floats | None = None) -> Floats:
+        """ln b_i(x_t) of the feasible pairs; other entries are undefined. Shape (N, frames).
+
+        Sequences may have means of their own, (K, N, D).
+        """
+        means = self.means[None] if means is None else means
         return kernels.stacked_log_outputs(
-            stack.columns, windows, self.means[None], self.whitening, self.log_norm, False
+            stack.columns, self.windows(stack), means, self.whitening, self.log_norm, diagonal
         )
 
     def log_likelihood(self, sequence: Floats) -> float:
         """ln p(X | lambda) with the finish state."""
-        return float(kernels.segments_log_likelihood(self.log_outputs(sequence), self.log_duration, self.d_min))
+        outputs = self.log_outputs(Stack.of([sequence]))
+        return float(kernels.segments_log_likelihood(outputs, self.log_duration, self.d_min))
 
     def expectation(self, sequence: Floats) -> tuple[float, Floats, Floats]:
         """Log-likelihood, responsibilities (T, N) and expected duration counts (N, d_max).
@@ -127,15 +118,7 @@ class Evaluator:
         Raises ValueError naming a sequence whose likelihood is zero, since there are no responsibilities then; `before`
         sequences are in other stacks.
         """
-        windows = self.windows(stack)
-        outputs = kernels.stacked_log_outputs(
-            stack.columns,
-            windows,
-            self.means[None] if means is None else means,
-            self.whitening,
-            self.log_norm,
-            diagonal,
-        )
+        outputs = self.log_outputs(stack, diagonal, means)
         values = kernels.stacked_segments(outputs, stack.offsets, self.log_duration, self.d_min, gamma, counts)
         if not np.isfinite(values).all():
             index = int(np.argmin(np.isfinite(values)))
@@ -159,22 +142,30 @@ class Moments:
         weight: shape (N,).
         first: shape (N, D).
         second: shape (N, D, D).
+        log_likelihood: of all sequences.
     """
 
     reference: Floats
     weight: Floats
     first: Floats
     second: Floats
+    log_likelihood: float
 
     @classmethod
     def none(cls, reference: Floats) -> "Moments":
         """Of no frames."""
         n_states, dim = reference.shape
-        return Moments(reference, np.zeros(n_states), np.zeros((n_states, dim)), np.zeros((n_states, dim, dim)))
+        return Moments(reference, np.zeros(n_states), np.zeros((n_states, dim)), np.zeros((n_states, dim, dim)), 0.0)
 
-    def plus(self, weight: Floats, first: Floats, second: Floats) -> "Moments":
-        """With those of more frames."""
-        return Moments(self.reference, self.weight + weight, self.first + first, self.second + second)
+    def plus(self, weight: Floats, first: Floats, second: Floats, values: Floats) -> "Moments":
+        """With those of more frames, whose sequences have the log-likelihoods `values`, shape (K,)."""
+        return Moments(
+            self.reference,
+            self.weight + weight,
+            self.first + first,
+            self.second + second,
+            self.log_likelihood + float(values.sum()),
+        )
 
     def unseen(self) -> NDArray[np.bool_]:
         """States that practically no frame belongs to. Shape (N,)."""
@@ -200,7 +191,6 @@ class Statistics(Moments):
     """Pooled sufficient statistics, with expected counts of durations (N, d_max)."""
 
     durations: Floats
-    log_likelihood: float
 
     @classmethod
     def gathered(cls, parameters: Parameters, sequences: Sequence[Floats]) -> "Statistics":
@@ -213,17 +203,71 @@ class Statistics(Moments):
         evaluator, diagonal = Evaluator.of(parameters), kind == "diagonal"
         moments, durations = Moments.none(evaluator.means), np.zeros_like(parameters.durations)
         gamma = np.empty((len(parameters.means), max(stack.n_frames for stack in stacks)))
-        log_likelihood, before = 0.0, 0
+        before = 0
         for stack in stacks:
             values = evaluator.stacked_expectation(stack, gamma, durations, diagonal, before)
-            moments = moments.plus(
-                *kernels.stacked_moments(
-                    stack.columns, evaluator.windows(stack), gamma, evaluator.means[None], diagonal
-                )
-            )
-            log_likelihood += float(values.sum())
+            windows = evaluator.windows(stack)
+            sums = kernels.stacked_moments(stack.columns, windows, gamma, evaluator.means[None], diagonal)
+            moments = moments.plus(*sums, values)
             before += len(values)
-        return cls(moments.reference, moments.weight, moments.first, moments.second, durations, log_likelihood)
+        return cls(**vars(moments), durations=durations)
+
+
+def check_kind(kind: str) -> None:
+    """Raise ValueError for a kind of covariance that does not exist."""
+    if kind not in get_args(Covariance):
+        raise ValueError(f"covariance is one of {', '.join(get_args(Covariance))}, found {kind!r}")
+
+
+def covariances_of(
+    scatter: Floats, weight: Floats, regularisation: Regularisation, kind: Covariance = "full"
+) -> Floats:
+    """Covariances with prior, shrinkage and floor; the exact M-step of the penalised objective once sigma is zero.
+
+    Sigma_i = (scatter_i + kappa target_i) / (weight_i + kappa) + sigma^2 I, eigenvalues not below the floor. "diagonal"
+    keeps the diagonals of scatter and target, "tied" takes sums over all states. Shape (N, D, D) for each kind.
+    """
+    kappa = regularisation.target_frames
+    pooled = scatter + kappa * regularisation.target
+    frames = weight + kappa
+    if kind == "diagonal":
+        pooled = pooled * np.eye(scatter.shape[1])
+    elif kind == "tied":
+        pooled, frames = pooled.sum(axis=0, keepdims=True), frames.sum(keepdims=True)
+    covariances: Floats = pooled / frames[:, None, None]
+    if regularisation.added_variance > 0:
+        covariances += regularisation.added_variance * np.eye(scatter.shape[1])
+    lifted = floored(covariances, regularisation.floor_variance)
+    return np.repeat(lifted, len(scatter), axis=0) if kind == "tied" else lifted
+
+
+def floored(covariances: Floats, floor_variance: float) -> Floats:
+    """The covariances with every eigenvalue at least `floor_variance`. Shape (N, D, D)."""
+    # Where the difference to the floor has a Cholesky factor, no eigenvalue is below it: a tenth of the work.
+    if floor_variance <= 0 or whitening_of(covariances - floor_variance * np.eye(covariances.shape[1]))[2] < 0:
+        return covariances
+    values, vectors = np.linalg.eigh(0.5 * (covariances + np.swapaxes(covariances, 1, 2)))
+    if (values >= floor_variance).all():
+        return covariances
+    lifted = np.maximum(values, floor_variance)
+    result: Floats = (vectors * lifted[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    return 0.5 * (result + np.swapaxes(result, 1, 2))
+
+
+def pooled_covariance(scatter: Floats, weight: Floats) -> Floats:
+    """Mean covariance over the states, repeated for each state. Shape (N, D, D)."""
+    return np.broadcast_to(scatter.sum(axis=0) / weight.sum(), scatter.shape)
+
+
+def log_prior(covariances: Floats, regularisation: Regularisation) -> float:
+    """The shrinkage as the logarithm of an inverse Wishart prior, up to a constant."""
+    if regularisation.target_frames == 0:
+        return 0.0
+    whitening, log_determinant, bad = whitening_of(covariances)
+    if bad >= 0:
+        return -np.inf
+    traces = ((whitening @ regularisation.target) * whitening).sum()
+    return -0.5 * regularisation.target_frames * float(log_determinant.sum() + traces)
 
 
 def durations_of(counts: Floats, d_min: int, pseudocount: float) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
+from paramove.hmm.chain import ChainEvaluator
 from paramove.hmm.sequences import checked_sequence
 
 
@@ -20,8 +21,10 @@ class OnlineFilter(ABC):
         n_frames: t.
     """
 
-    def __init__(self, means: Floats, whitening: Floats, log_norm: Floats) -> None:
+    def __init__(self, means: Floats, whitening: Floats, log_norm: Floats, log_start: Floats) -> None:
         self._means, self._whitening, self._log_norm = means, whitening, log_norm
+        self._log_state = log_start
+        """Log probabilities of the state after the frames so far; of the first frame's state while there is none."""
         self.log_likelihood = 0.0
         self.n_frames = 0
 
@@ -35,15 +38,15 @@ class OnlineFilter(ABC):
         white = np.einsum("ijk,ik->ij", self._whitening, checked - self._means)
         log_output = self._log_norm - 0.5 * np.einsum("ij,ij->i", white, white)
         with np.errstate(divide="ignore"):
-            joint = self._predicted()
-        joint = joint + log_output.reshape((-1,) + (1,) * (joint.ndim - 1))
+            predicted = self._predicted() if self.n_frames else self._log_state
+        joint = predicted + log_output.reshape((-1,) + (1,) * (predicted.ndim - 1))
         gain = float(np.logaddexp.reduce(joint, axis=None))
         if not np.isfinite(gain):
             raise ValueError(
                 f"the model has no path for frame {self.n_frames + 1} of this movement: it allows fewer frames; "
                 "begin a new filter where a new movement begins"
             )
-        self._store(joint - gain)
+        self._log_state = joint - gain
         self.log_likelihood += gain
         self.n_frames += 1
         return self.posterior()
@@ -58,72 +61,52 @@ class OnlineFilter(ABC):
 
     @abstractmethod
     def _predicted(self) -> Floats:
-        """Log probabilities of the state of the next frame."""
-
-    @abstractmethod
-    def _store(self, log_probabilities: Floats) -> None: ...
+        """Log probabilities of the state of the next frame, after at least one."""
 
 
 class ChainFilter(OnlineFilter):
     """For a plain chain; with a finish state the movement has not ended while frames arrive."""
 
-    def __init__(
-        self, start: Floats, transitions: Floats, exits: Floats, means: Floats, whitening: Floats, log_norm: Floats
-    ) -> None:
-        super().__init__(means, whitening, log_norm)
-        with np.errstate(divide="ignore"):
-            self._log_start, self._log_transitions = np.log(start), np.log(transitions)
-        self._exits = exits
-        self._log_state: Floats | None = None
+    def __init__(self, evaluator: ChainEvaluator) -> None:
+        super().__init__(evaluator.parameters.means, evaluator.whitening, evaluator.log_norm, evaluator.log_start)
+        self._evaluator = evaluator
 
     def posterior(self) -> Floats:
         """p(q_t = i | x_1..x_t); before the first frame p(q_1 = i). Shape (N,)."""
-        result: Floats = np.exp(self._log_start if self._log_state is None else self._log_state)
-        return result
+        return np.exp(self._log_state)
 
     def finish_probability(self) -> float:
         """p(the movement ends with this frame | x_1..x_t)."""
-        return 0.0 if self._log_state is None else float(self.posterior() @ self._exits)
+        return float(self.posterior() @ self._evaluator.parameters.exits) if self.n_frames else 0.0
 
     def _predicted(self) -> Floats:
-        if self._log_state is None:
-            return self._log_start
-        result: Floats = np.logaddexp.reduce(self._log_state[:, None] + self._log_transitions, axis=0)
+        result: Floats = np.logaddexp.reduce(self._log_state[:, None] + self._evaluator.log_transitions, axis=0)
         return result
-
-    def _store(self, log_probabilities: Floats) -> None:
-        self._log_state = log_probabilities
 
 
 class DurationFilter(OnlineFilter):
     """For a left-right HMM with explicit durations: state and frames spent in it so far."""
 
     def __init__(self, durations: Floats, means: Floats, whitening: Floats, log_norm: Floats) -> None:
-        super().__init__(means, whitening, log_norm)
+        start = np.full(durations.shape, -np.inf)
+        start[0, 0] = 0.0
+        super().__init__(means, whitening, log_norm, start)
         lasting = np.cumsum(durations[:, ::-1], axis=1)[:, ::-1]  # p(at least d frames)
         with np.errstate(divide="ignore", invalid="ignore"):
             leave = np.where(lasting > 0, durations / lasting, 1.0)
             self._log_leave, self._log_stay = np.log(leave), np.log(np.clip(1.0 - leave[:, :-1], 0.0, 1.0))
-        self._log_state: Floats | None = None
 
     def posterior(self) -> Floats:
         """p(q_t = i | x_1..x_t); before the first frame the first state. Shape (N,)."""
-        n_states = len(self._log_leave)
-        result: Floats = np.eye(n_states)[0] if self._log_state is None else np.exp(self._log_state).sum(axis=1)
+        result: Floats = np.exp(self._log_state).sum(axis=1)
         return result
 
     def finish_probability(self) -> float:
         """p(the movement ends with this frame | x_1..x_t)."""
-        return 0.0 if self._log_state is None else float(np.exp(self._log_state[-1] + self._log_leave[-1]).sum())
+        return float(np.exp(self._log_state[-1] + self._log_leave[-1]).sum()) if self.n_frames else 0.0
 
     def _predicted(self) -> Floats:
         result: Floats = np.full(self._log_leave.shape, -np.inf)
-        if self._log_state is None:
-            result[0, 0] = 0.0
-        else:
-            result[1:, 0] = np.logaddexp.reduce(self._log_state[:-1] + self._log_leave[:-1], axis=1)
-            result[:, 1:] = self._log_state[:, :-1] + self._log_stay
+        result[1:, 0] = np.logaddexp.reduce(self._log_state[:-1] + self._log_leave[:-1], axis=1)
+        result[:, 1:] = self._log_state[:, :-1] + self._log_stay
         return result
-
-    def _store(self, log_probabilities: Floats) -> None:
-        self._log_state = log_probabilities

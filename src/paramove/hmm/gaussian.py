@@ -22,7 +22,7 @@ from paramove.hmm.chain import (
     maximised,
 )
 from paramove.hmm.chain_kernels import best_path
-from paramove.hmm.covariances import Covariance, check_kind
+from paramove.hmm.estimation import Covariance, check_kind
 from paramove.hmm.filtering import ChainFilter
 from paramove.hmm.options import Regularisation, TrainingOptions, TrainingSummary
 from paramove.hmm.sequences import (
@@ -37,12 +37,6 @@ from paramove.hmm.sequences import (
 from paramove.hmm.training import iterate, segment_outputs
 
 Initialisation = Literal["segments", "random"]
-
-
-def check_initialisation(name: str) -> None:
-    """Raise ValueError for an initialisation that does not exist."""
-    if name not in get_args(Initialisation):
-        raise ValueError(f"initialisation is one of {', '.join(get_args(Initialisation))}, found {name!r}")
 
 
 def initial_chain(
@@ -131,7 +125,10 @@ class GaussianHMM:
         if n_states < 1:
             raise ValueError(f"n_states is at least 1, found {n_states}")
         check_kind(covariance)
-        check_initialisation(initialisation)
+        if initialisation not in get_args(Initialisation):
+            raise ValueError(
+                f"initialisation is one of {', '.join(get_args(Initialisation))}, found {initialisation!r}"
+            )
         self.n_states, self.covariance, self.initialisation, self.seed = n_states, covariance, initialisation, seed
         self.topology = Topology(topology, max_skip, self_transitions, finish_state)
         self.options = options if options is not None else TrainingOptions()
@@ -247,8 +244,7 @@ class GaussianHMM:
 
     def filter(self) -> ChainFilter:
         """State probabilities of a new movement, frame by frame without lookahead."""
-        ready, own = self._ready(), self.parameters
-        return ChainFilter(own.start, own.transitions, own.exits, own.means, ready.whitening, ready.log_norm)
+        return ChainFilter(self._ready())
 
     def expected_durations(self) -> Floats:
         """Expected number of consecutive frames of each state, 1 / (1 - a_ii) (2.2.4). Shape (N,).

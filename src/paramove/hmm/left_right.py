@@ -8,12 +8,11 @@ from numpy.typing import ArrayLike
 
 from paramove.documents import Floats, Ints
 from paramove.hmm import kernels, synthesis
-from paramove.hmm.covariances import Covariance, check_kind
-from paramove.hmm.estimation import Evaluator, Parameters
+from paramove.hmm.estimation import Covariance, Evaluator, Parameters, check_kind
 from paramove.hmm.filtering import DurationFilter
 from paramove.hmm.options import TrainingOptions, TrainingSummary
 from paramove.hmm.sequences import (
-    SequenceLengthError,
+    Stack,
     check_demonstrations,
     check_length,
     checked_sequence,
@@ -105,10 +104,7 @@ class LeftRightHMM:
         """
         checked = checked_sequences(sequences)
         for index, sequence in enumerate(checked):
-            try:
-                check_length(len(sequence), self.n_states, self.d_min, self.d_max)
-            except SequenceLengthError as error:
-                raise SequenceLengthError(f"sequence {index}: {error}") from error
+            check_length(len(sequence), self.n_states, self.d_min, self.d_max, f"sequence {index}: ")
         check_demonstrations(checked, self.options.floor_deviation)
         if initial is None:
             initial = equal_segments(checked, self.n_states, self.d_min, self.d_max, self.options, self.covariance)
@@ -134,7 +130,7 @@ class LeftRightHMM:
     def segment_borders(self, sequence: ArrayLike) -> Ints:
         """First frame of each state in the best segmentation, then T. Shape (N + 1,)."""
         checked, ready = self._checked(sequence), self._ready()
-        outputs, ends = ready.log_outputs(checked), ready.ends(len(checked))
+        outputs, ends = ready.log_outputs(Stack.of([checked])), ready.ends(len(checked))
         return kernels.best_segmentation(outputs, ready.log_duration, self.d_min, ends)[1]
 
     def filter(self) -> DurationFilter:

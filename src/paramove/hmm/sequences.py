@@ -158,13 +158,13 @@ def check_demonstrations(sequences: Sequence[Floats], floor_deviation: float) ->
         )
 
 
-def check_length(n_frames: int, n_states: int, d_min: int, d_max: int) -> None:
-    """Raise SequenceLengthError unless N d_min <= T <= N d_max (thesis 4.1.2.1)."""
+def check_length(n_frames: int, n_states: int, d_min: int, d_max: int, prefix: str = "") -> None:
+    """Raise SequenceLengthError unless N d_min <= T <= N d_max (thesis 4.1.2.1); its message begins with `prefix`."""
     shortest, longest = n_states * d_min, n_states * d_max
     if not shortest <= n_frames <= longest:
         raise SequenceLengthError(
-            f"a sequence of {n_frames} frames does not fit {n_states} states of {d_min} to {d_max} frames each: "
-            f"allowed are {shortest} to {longest} frames; resample it, best to about {(shortest + longest) // 2}"
+            f"{prefix}a sequence of {n_frames} frames does not fit {n_states} states of {d_min} to {d_max} frames "
+            f"each: allowed are {shortest} to {longest} frames; resample it, best to about {(shortest + longest) // 2}"
         )
 
 

@@ -4,13 +4,21 @@ import logging
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from paramove.documents import Floats, Ints
-from paramove.hmm.covariances import Covariance, covariances_of, pooled_covariance
-from paramove.hmm.estimation import Parameters, Statistics, durations_of, penalty
+from paramove.hmm.estimation import (
+    Covariance,
+    Moments,
+    Parameters,
+    Statistics,
+    covariances_of,
+    durations_of,
+    penalty,
+    pooled_covariance,
+)
 from paramove.hmm.options import Regularisation, TrainingOptions, TrainingSummary
 from paramove.hmm.sequences import Stack
 
@@ -119,22 +127,8 @@ def train(
     return iterate(initial, sequences, options, expect, maximise, penalty)
 
 
-class Expectation(Protocol):
-    """The result of an E-step that the loop below needs."""
-
-    @property
-    def log_likelihood(self) -> float: ...
-
-    @property
-    def weight(self) -> Floats: ...
-
-    def means(self) -> Floats: ...
-
-    def scatter(self, means: Floats) -> Floats: ...
-
-
 Model = TypeVar("Model")
-Expected = TypeVar("Expected", bound=Expectation)
+Expected = TypeVar("Expected", bound=Moments)
 
 
 def iterate(
