@@ -151,7 +151,7 @@ def test_import_and_label_afterwards(csv, tmp_path):
     good("label", folder, "--recording", "take.mcap", "--action", "pointing", "--start", 0.2, "--end", 1.5)
     assert "# Anna looked away" in (folder / "labels.yaml").read_text()
     said = rejected(78, "label", folder, "--recording", "take.mcap", "--action", "x", "--start", 1, "--end", 9)
-    assert "the recording covers 0 to 1.8 s" in said
+    assert "its recording, which covers 0 to 1.8 s" in said
 
 
 def test_import_finds_movements(csv, tmp_path):

@@ -62,8 +62,8 @@ def test_labels_are_made_and_added(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "detail"),
     [
-        ({"end": 9.0}, "a.mcap, 0.4 to 9 s: the recording covers 0 to 3.62 s"),
-        ({"end": 0.405}, "1 frames; a movement has at least 2"),
+        ({"end": 9.0}, "a.mcap, 0.4 to 9 s ends after its recording, which covers 0 to 3.62 s"),
+        ({"end": 0.405}, r"holds 1 frame of 182 .*; a movement has at least 2"),
         ({"end": 0.2}, "the end is not after the start"),
         ({"recording": "b.mcap"}, "there is no recording"),
     ],

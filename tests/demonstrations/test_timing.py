@@ -13,6 +13,11 @@ from paramove.demonstrations.movement import DemonstrationError
 from tests.demonstrations.movements import movement, reach
 
 
+def onset(one, point="index"):
+    """Number of frames that are cut before the movement begins."""
+    return len(one.time) - len(timing.cut_by_speed(one, point).time)
+
+
 def test_the_same_rate_changes_nothing():
     one = movement()
     assert timing.resampled(one, 50.0) is one
@@ -50,17 +55,17 @@ def test_the_onset_is_where_the_true_speed_passes_3_cm_per_s():
     share = np.clip(one.time - 0.4, 0.0, 1.0)
     speed = 30 * share**2 * (1 - share) ** 2 * np.linalg.norm([0.3, 0.1, 0.3])
     true = int(np.flatnonzero(speed > timing.SLOW)[0])
-    assert abs(timing.onset(one) - true) <= 2
+    assert abs(onset(one) - true) <= 2
     cut = timing.cut_by_speed(one, end=True)
     assert abs(len(cut.time) - int((speed > timing.SLOW).sum())) <= 4
     assert cut.time[0] == 0.0
-    assert len(timing.cut_by_speed(one).time) == len(one.time) - timing.onset(one)
+    assert_allclose(cut.positions, one.positions[onset(one) :][: len(cut.time)], rtol=0.0, atol=0.0)
 
 
 def test_noise_of_markers_is_no_movement():
     rng = np.random.default_rng(3)
     onsets = [
-        timing.onset(replace(movement(), positions=movement().positions + rng.normal(0.0, 5e-4, (91, 5, 3))))
+        onset(replace(movement(), positions=movement().positions + rng.normal(0.0, 5e-4, (91, 5, 3))))
         for _ in range(20)
     ]
     assert max(onsets) - min(onsets) <= 4
@@ -70,16 +75,17 @@ def test_a_slow_drift_before_the_movement_is_not_its_begin():
     time, positions = reach((0.4, 0.1, -0.1))
     drift = positions.copy()
     drift[:, :, 0] += 0.02 * np.minimum(time, 0.4)[:, None]  # 2 cm/s
-    assert timing.onset(replace(movement(), positions=drift)) >= 18
+    assert onset(replace(movement(), positions=drift)) >= 18
 
 
 def test_what_never_moves_is_refused_with_its_speed():
     still = replace(movement(source="a.mcap"), positions=0.1 * movement().positions)
     with pytest.raises(DemonstrationError, match=r"a.mcap: index never exceeds 15 cm/s \(its largest speed is 8"):
-        timing.onset(still)
+        onset(still)
     with pytest.raises(DemonstrationError, match="there is no point 'thumb'; there are sternum, shoulder"):
-        timing.onset(movement(), "thumb")
+        onset(movement(), "thumb")
 
 
 def test_a_movement_that_is_under_way_begins_at_once():
-    assert timing.onset(timing.part(movement(), 45, 91)) == 0
+    one = movement()
+    assert onset(replace(one, time=one.time[45:] - one.time[45], positions=one.positions[45:])) == 0

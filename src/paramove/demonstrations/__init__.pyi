@@ -21,6 +21,8 @@ from .body_frame import mirrored as mirrored
 from .demonstration_set import DemonstrationSet as DemonstrationSet
 from .demonstration_set import Sequences as Sequences
 from .gaps import fill_gaps as fill_gaps
+from .gaps import gaps_in_words as gaps_in_words
+from .gaps import gaps_within as gaps_within
 from .kinesthetic_teaching import KinestheticTeacher as KinestheticTeacher
 from .labelling import label as label
 from .labelling import movements_by_speed as movements_by_speed

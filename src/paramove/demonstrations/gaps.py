@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,10 +30,15 @@ class PointGap:
         return f"{self.point} in {frames} ({length})"
 
 
-def lost(positions: Floats) -> NDArray[np.bool_]:
-    """Whether a point has no finite position. Shape (T, P, 3) -> (T, P)."""
-    result: NDArray[np.bool_] = np.asarray(~np.isfinite(positions).all(axis=-1))
-    return result
+def gaps_within(gaps: Iterable[PointGap], first: int, end: int) -> list[PointGap]:
+    """Those that lie in the frames from `first` to before `end`, at least in part."""
+    return [gap for gap in gaps if gap.end > first and gap.first < end]
+
+
+def gaps_in_words(gaps: Sequence[PointGap], maximum: int = 4) -> str:
+    """Gaps as text; those beyond `maximum` are counted."""
+    more = f" and {len(gaps) - maximum} more" if len(gaps) > maximum else ""
+    return "; ".join(map(str, gaps[:maximum])) + more
 
 
 def fill_gaps(
@@ -51,7 +57,7 @@ def fill_gaps(
         the beginning or end. Valid positions are unchanged.
     """
     result = positions.copy()
-    missing = lost(positions)
+    missing: NDArray[np.bool_] = np.asarray(~np.isfinite(positions).all(axis=-1))
     result[missing] = np.nan
     filled, left = [], []
     for point in np.flatnonzero(missing.any(axis=0)):

@@ -10,8 +10,9 @@ import numpy as np
 from paramove.demonstrations.gaps import fill_gaps
 from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, append_segments, load_labels, write_labels
 from paramove.demonstrations.movement import DemonstrationError, Movement
-from paramove.demonstrations.pose_recording import BILLION, PoseRecording, read_poses
-from paramove.demonstrations.timing import FAST, FINGERTIP, SLOW, speeds
+from paramove.demonstrations.pose_recording import read_poses
+from paramove.demonstrations.reading import fault_in_recording
+from paramove.demonstrations.timing import FINGERTIP, fast_parts, speeds
 from paramove.documents import Floats, nearest
 
 
@@ -34,19 +35,7 @@ def movements_by_speed(
         raise DemonstrationError(f"{point} is valid in {valid.sum()} frames; no movement can be detected from it")
     whole = np.stack([np.interp(time, time[valid], path[valid, axis]) for axis in range(3)], axis=-1)
     movement = Movement(time - time[0], whole[:, None, :], (point,), "", "any", np.zeros(0))
-    speed = speeds(movement, point)
-    movements: list[tuple[int, int]] = []
-    begin = 0
-    for quick in np.flatnonzero(speed > FAST).tolist():
-        if quick < begin:
-            continue
-        still = np.flatnonzero(speed[begin:quick] <= SLOW)
-        after = np.flatnonzero(speed[quick:] <= SLOW)
-        first = begin + int(still[-1]) + 1 if still.size else begin
-        end = quick + int(after[0]) + 1 if after.size else len(time)
-        movements.append((first, end))
-        begin = end
-    return movements
+    return [(first, min(end + 1, len(time))) for first, end in fast_parts(speeds(movement, point))]
 
 
 def next_repetition(there: Sequence[Segment], segment: Segment) -> int:
@@ -70,11 +59,13 @@ def label(folder: Path, segments: Sequence[Segment], parameter_names: Sequence[s
 
     Raises DemonstrationError if a segment is not within its recording, or contradicts labels.yaml.
     """
-    recordings: dict[str, PoseRecording] = {}
+    recordings = {name: read_poses(folder / name) for name in dict.fromkeys(one.recording for one in segments)}
     for segment in segments:
-        if segment.recording not in recordings:
-            recordings[segment.recording] = read_poses(folder / segment.recording)
-        _reject(segment, recordings[segment.recording])
+        if segment.end <= segment.start:
+            raise DemonstrationError(f"{segment}: the end is not after the start")
+        fault = fault_in_recording(segment, recordings[segment.recording])
+        if fault:
+            raise DemonstrationError(fault)
     file = folder / FILE_NAME
     if not file.exists():
         write_labels(file, LabelsFile(parameters=list(_names(segments, parameter_names))))
@@ -97,15 +88,3 @@ def _names(segments: Sequence[Segment], given: Sequence[str] | None) -> Sequence
     if count == 3:
         return ("target_x", "target_y", "target_z")
     return [f"parameter_{number}" for number in range(1, count + 1)]
-
-
-def _reject(segment: Segment, poses: PoseRecording) -> None:
-    since = poses.time_ns - poses.time_ns[0]
-    what = f"{segment.recording}, {segment.start:g} to {segment.end:g} s"
-    if segment.end <= segment.start:
-        raise DemonstrationError(f"{what}: the end is not after the start")
-    if round(segment.end * BILLION) > since[-1] + (since[-1] // max(len(since) - 1, 1)):
-        raise DemonstrationError(f"{what}: the recording covers 0 to {since[-1] / BILLION:.6g} s")
-    inside = int(((since >= round(segment.start * BILLION)) & (since <= round(segment.end * BILLION))).sum())
-    if inside < 2:
-        raise DemonstrationError(f"{what}: {inside} frames; a movement has at least 2: make it longer")

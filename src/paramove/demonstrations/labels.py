@@ -80,6 +80,9 @@ class Segment(_Checked):
     repetition: int = Field(default=0, ge=0, description="counts movements with the same action, theta and subject")
     side: Literal["right", "left"] = Field(default="right", description="which arm moves")
 
+    def __str__(self) -> str:
+        return f"{self.recording}, {self.start:g} to {self.end:g} s"
+
 
 class LabelsFile(_Checked):
     """The content of labels.yaml."""
@@ -188,10 +191,7 @@ def _contradictions(labels: Labels) -> list[DocumentError]:
         key = (segment.recording, segment.start, segment.end, segment.action, segment.side)
         first = first_index.setdefault(key, index)
         if first != index:
-            message = (
-                f"the same segment ({segment.recording}, {segment.start:g} to {segment.end:g} s) "
-                f"is in line {labels.line(first)} too; remove one"
-            )
+            message = f"the same segment ({segment}) is in line {labels.line(first)} too; remove one"
             findings.append(labels.error(index, message))
     return findings
 

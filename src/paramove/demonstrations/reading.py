@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.demonstrations.gaps import PointGap, fill_gaps
+from paramove.demonstrations.gaps import PointGap, fill_gaps, gaps_in_words, gaps_within
 from paramove.demonstrations.labels import Labels, LabelsError, Segment
 from paramove.demonstrations.movement import DemonstrationError, Movement
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, read_poses
-from paramove.documents import DocumentError, Floats, nearest, raise_any
+from paramove.documents import DocumentError, nearest, raise_any
 
 
 def read_movements(labels: Labels) -> tuple[list[Movement], list[str]]:
@@ -33,7 +35,7 @@ class _Reader:
         self.findings: list[DocumentError] = []
         self.remarks: list[str] = []
         self._labels = labels
-        self._recordings: dict[str, _Filled | None] = {}
+        self._recordings: dict[str, tuple[PoseRecording, list[PointGap], list[PointGap]] | None] = {}
         self._points: tuple[str, ...] = tuple(labels.file.points or ())
         self._pattern = ""
         """Name of the recording whose points and frame the others must have."""
@@ -45,23 +47,33 @@ class _Reader:
         recording = self._recordings[segment.recording]
         if recording is None:
             return None
-        wrong = self._out_of_range(segment, recording.poses)
-        if wrong:
-            self.findings.append(self._labels.error(index, wrong))
+        poses, filled, left = recording
+        fault = fault_in_recording(segment, poses)
+        if fault:
+            self.findings.append(self._labels.error(index, fault))
             return None
-        chosen = recording.frames(segment)
-        wrong = _too_few(segment, chosen, recording.poses) or _open_gaps(segment, chosen, recording, self._max_gap)
-        if wrong:
-            self.findings.append(self._labels.error(index, wrong))
+        chosen = _frames(segment, poses)
+        inside = gaps_within(left, chosen[0], chosen[-1] + 1)
+        if inside:
+            message = (
+                f"{segment}: lost for longer than max_gap ({self._max_gap:g} s): {gaps_in_words(inside)}, counted from "
+                "the beginning of the recording. Leave the point out with `points`, shorten the segment, or raise "
+                "max_gap"
+            )
+            self.findings.append(self._labels.error(index, message))
             return None
-        self._remark(index, segment, chosen, recording)
-        return self._cut(index, segment, chosen, recording)
+        inside = gaps_within(filled, chosen[0], chosen[-1] + 1)
+        if inside:
+            location = f"{self._labels.path.name}:{self._labels.line(index)}"
+            self.remarks.append(f"{location}: {segment}: filled {gaps_in_words(inside, 3)}")
+        return self._cut(index, segment, chosen, poses)
 
     @property
     def _max_gap(self) -> float:
         return self._labels.file.max_gap
 
-    def _read(self, index: int, segment: Segment) -> _Filled | None:
+    def _read(self, index: int, segment: Segment) -> tuple[PoseRecording, list[PointGap], list[PointGap]] | None:
+        """The recording with its short gaps filled, these gaps, and those that are too long."""
         folder = self._labels.path.parent
         path = folder / segment.recording
         if not path.is_file() and not path.with_name(path.name + ".part").is_file():
@@ -70,11 +82,12 @@ class _Reader:
             self.findings.append(self._labels.error(index, message, "recording"))
             return None
         try:
-            poses = read_poses(path)
-            return _Filled(self._with_points(poses, segment.recording), self._max_gap)
+            poses = self._with_points(read_poses(path), segment.recording)
         except DemonstrationError as error:
             self.findings.append(self._labels.error(index, str(error), "recording"))
             return None
+        positions, filled, left = fill_gaps(poses.time, poses.positions, poses.point_names, self._max_gap)
+        return replace(poses, positions=positions), filled, left
 
     def _with_points(self, poses: PoseRecording, name: str) -> PoseRecording:
         """The points that the set has, in its order; raises DemonstrationError if the recording has others."""
@@ -91,30 +104,13 @@ class _Reader:
         order = [poses.point_names.index(point) for point in expected]
         return PoseRecording(poses.time_ns, poses.positions[:, order], expected, poses.frame)
 
-    def _out_of_range(self, segment: Segment, poses: PoseRecording) -> str:
-        time = poses.time
-        frame_s = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-        if segment.end <= time[-1] + frame_s:
-            return ""
-        return (
-            f"{_words(segment)} ends after its recording, which covers 0 to {time[-1]:.6g} s: correct start and end"
-            f", or, if {segment.recording} was cut off, see `paramove recover`"
-        )
-
-    def _remark(self, index: int, segment: Segment, chosen: NDArray[np.intp], recording: _Filled) -> None:
-        inside = [gap for gap in recording.filled if gap.end > chosen[0] and gap.first <= chosen[-1]]
-        if inside:
-            location = f"{self._labels.path.name}:{self._labels.line(index)}"
-            gaps = "; ".join(map(str, inside[:3])) + (f" and {len(inside) - 3} more" if len(inside) > 3 else "")
-            self.remarks.append(f"{location}: {_words(segment)}: filled {gaps}")
-
-    def _cut(self, index: int, segment: Segment, chosen: NDArray[np.intp], recording: _Filled) -> Movement:
-        time_ns = recording.poses.time_ns[chosen]
+    def _cut(self, index: int, segment: Segment, chosen: NDArray[np.intp], poses: PoseRecording) -> Movement:
+        time_ns = poses.time_ns[chosen]
         return Movement(
             time=(time_ns - time_ns[0]) / BILLION,
-            positions=recording.positions[chosen],
-            point_names=recording.poses.point_names,
-            frame=recording.poses.frame,
+            positions=poses.positions[chosen],
+            point_names=poses.point_names,
+            frame=poses.frame,
             action=segment.action,
             theta=np.array(segment.theta, dtype=np.float64),
             parameter_names=tuple(self._labels.file.parameters),
@@ -122,45 +118,30 @@ class _Reader:
             repetition=segment.repetition,
             side=segment.side,
             recording=segment.recording,
-            source=f"{self._labels.path}:{self._labels.line(index)}: {_words(segment)}",
+            source=f"{self._labels.path}:{self._labels.line(index)}: {segment}",
         )
 
 
-class _Filled:
-    """A recording with its short gaps filled."""
-
-    def __init__(self, poses: PoseRecording, max_gap: float) -> None:
-        self.poses = poses
-        self.positions: Floats
-        self.positions, self.filled, self.open = fill_gaps(poses.time, poses.positions, poses.point_names, max_gap)
-
-    def frames(self, segment: Segment) -> NDArray[np.intp]:
-        """Frames of a segment, both ends included."""
-        since = self.poses.time_ns - self.poses.time_ns[0]
-        inside = (since >= round(segment.start * BILLION)) & (since <= round(segment.end * BILLION))
-        return np.flatnonzero(inside)
-
-
-def _words(segment: Segment) -> str:
-    return f"{segment.recording}, {segment.start:g} to {segment.end:g} s"
-
-
-def _too_few(segment: Segment, chosen: NDArray[np.intp], poses: PoseRecording) -> str:
-    if len(chosen) > 1:
+def fault_in_recording(segment: Segment, poses: PoseRecording) -> str:
+    """Why a segment is no movement of its recording; "" if it is one."""
+    time = poses.time
+    frame_s = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if segment.end > time[-1] + frame_s:
+        return (
+            f"{segment} ends after its recording, which covers 0 to {time[-1]:.6g} s: correct start and end"
+            f", or, if {segment.recording} was cut off, see `paramove recover`"
+        )
+    count = len(_frames(segment, poses))
+    if count > 1:
         return ""
-    rate = (len(poses.time) - 1) / poses.time[-1] if len(poses.time) > 1 else 0.0
+    rate = (len(time) - 1) / time[-1] if len(time) > 1 else 0.0
     return (
-        f"{_words(segment)} holds {len(chosen)} frame{'' if len(chosen) == 1 else 's'} of {len(poses.time)} "
+        f"{segment} holds {count} frame{'' if count == 1 else 's'} of {len(time)} "
         f"(about {rate:.3g} Hz); a movement has at least 2: make it longer"
     )
 
 
-def _open_gaps(segment: Segment, chosen: NDArray[np.intp], recording: _Filled, max_gap: float) -> str:
-    inside: list[PointGap] = [gap for gap in recording.open if gap.end > chosen[0] and gap.first <= chosen[-1]]
-    if not inside:
-        return ""
-    gaps: str = "; ".join(map(str, inside[:4])) + (f" and {len(inside) - 4} more" if len(inside) > 4 else "")
-    return (
-        f"{_words(segment)}: lost for longer than max_gap ({max_gap:g} s): {gaps}, counted from the beginning of the "
-        "recording. Leave the point out with `points`, shorten the segment, or raise max_gap"
-    )
+def _frames(segment: Segment, poses: PoseRecording) -> NDArray[np.intp]:
+    """Frames of a segment, both ends included."""
+    since = poses.time_ns - poses.time_ns[0]
+    return np.flatnonzero((since >= round(segment.start * BILLION)) & (since <= round(segment.end * BILLION)))

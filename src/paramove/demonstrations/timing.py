@@ -11,7 +11,7 @@ from paramove.documents import Floats
 
 FINGERTIP = "index"
 SLOW, FAST = 0.03, 0.15
-"""m/s. A movement begins with the first frame above the one before it exceeds the other."""
+"""m/s. A movement begins with the first frame above the one before it exceeds the other (`fast_parts`)."""
 SPEED_WINDOW = 0.2
 """s. Speeds come from parabolas through this much of the path, so that markers' noise does not count as movement."""
 
@@ -60,40 +60,37 @@ def speeds(movement: Movement, point: str = FINGERTIP) -> Floats:
     return result
 
 
-def onset(movement: Movement, point: str = FINGERTIP, slow: float = SLOW, fast: float = FAST) -> int:
-    """The first frame above `slow` before the point exceeds `fast`, m/s: the same rule for all actions.
+def fast_parts(speed: Floats) -> list[tuple[int, int]]:
+    """Movements in speeds (T,), m/s: first frame and one past the last of each; the same rule for all actions.
 
-    Frame 0 if the point is never at rest before. Raises DemonstrationError if it never exceeds `fast`.
+    Each begins with the first frame above `SLOW` before the speed exceeds `FAST`, and ends with the last one before it
+    falls to `SLOW`.
+    """
+    parts: list[tuple[int, int]] = []
+    begin = 0
+    for quick in np.flatnonzero(speed > FAST).tolist():
+        if quick < begin:
+            continue
+        still = np.flatnonzero(speed[begin:quick] <= SLOW)
+        after = np.flatnonzero(speed[quick:] <= SLOW)
+        first = begin + int(still[-1]) + 1 if still.size else begin
+        begin = quick + int(after[0]) if after.size else len(speed)
+        parts.append((first, begin))
+    return parts
+
+
+def cut_by_speed(movement: Movement, point: str = FINGERTIP, *, end: bool = False) -> Movement:
+    """The movement from its first frame above `SLOW` on; with `end` also only to the last one, after the last `FAST`.
+
+    From frame 0 if the point is never at rest before. Raises DemonstrationError if it never exceeds `FAST`.
     """
     speed = speeds(movement, point)
-    quick = np.flatnonzero(speed > fast)
-    if not quick.size:
+    parts = fast_parts(speed)
+    if not parts:
         raise DemonstrationError(
-            f"{movement.source}: {point} never exceeds {fast * 100:g} cm/s (its largest speed is "
+            f"{movement.source}: {point} never exceeds {FAST * 100:g} cm/s (its largest speed is "
             f"{speed.max() * 100:.1f} cm/s): this is no movement, or the unit is wrong"
         )
-    still = np.flatnonzero(speed[: quick[0]] <= slow)
-    return int(still[-1]) + 1 if still.size else 0
-
-
-def cut_by_speed(
-    movement: Movement, point: str = FINGERTIP, slow: float = SLOW, fast: float = FAST, *, end: bool = False
-) -> Movement:
-    """The movement from its onset on; with `end` also only to the last frame above `slow` after the last above `fast`.
-
-    Raises DemonstrationError as `onset` does.
-    """
-    first = onset(movement, point, slow, fast)
-    last = len(movement.time)
-    if end:
-        speed = speeds(movement, point)
-        after = int(np.flatnonzero(speed > fast)[-1])
-        still = np.flatnonzero(speed[after:] <= slow)
-        last = after + int(still[0]) if still.size else last
-    return part(movement, first, last)
-
-
-def part(movement: Movement, first: int, end: int) -> Movement:
-    """Frames from `first` to before `end`; time begins at 0 again."""
-    time = movement.time[first:end]
-    return replace(movement, time=time - time[:1], positions=movement.positions[first:end])
+    inside = slice(parts[0][0], parts[-1][1] if end else None)
+    time = movement.time[inside]
+    return replace(movement, time=time - time[:1], positions=movement.positions[inside])

@@ -8,7 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.demonstrations import DemonstrationError, Label, Take, fill_gaps, movements_by_speed, recording_name
+from paramove.demonstrations import (
+    DemonstrationError,
+    Label,
+    Take,
+    fill_gaps,
+    gaps_in_words,
+    gaps_within,
+    movements_by_speed,
+    recording_name,
+)
 from paramove.demonstrations.importing.bvh import read_bvh
 from paramove.demonstrations.importing.c3d import read_c3d
 from paramove.demonstrations.importing.conversion import ImportOptions, converted
@@ -107,25 +116,20 @@ def _checked(take: Take, path: Path, max_gap: float) -> tuple[Take, list[str], l
         if not 0 <= label.first < label.end - 1 <= len(take.time) - 1:
             rejected.append(f"{what}: the file has frames 0-{len(take.time) - 1}, and a movement has at least 2")
             continue
-        open_gaps = [gap for gap in left if gap.end > label.first and gap.first < label.end]
-        shut = [gap for gap in filled if gap.end > label.first and gap.first < label.end]
+        open_gaps = gaps_within(left, label.first, label.end)
         if open_gaps:
-            gaps = "; ".join(map(str, open_gaps[:4])) + _more(len(open_gaps) - 4)
             always = [gap.point for gap in open_gaps if gap.end - gap.first == len(take.time)]
             hint = (
                 f" {', '.join(always)} is lost in all frames: is it (0, 0, 0) on purpose (--zeros-are-places)?"
                 if always
                 else ""
             )
-            rejected.append(f"{what}: lost for longer than {max_gap:g} s: {gaps}.{hint}")
+            rejected.append(f"{what}: lost for longer than {max_gap:g} s: {gaps_in_words(open_gaps)}.{hint}")
             continue
+        shut = gaps_within(filled, label.first, label.end)
         if shut:
-            remarks.append(f"{what}: filled {'; '.join(map(str, shut[:4]))}{_more(len(shut) - 4)}")
+            remarks.append(f"{what}: filled {gaps_in_words(shut)}")
         labels.append(label)
     if not np.isfinite(take.positions).any():
         rejected.append(f"{path}: all points are lost in all frames")
     return replace(take, labels=tuple(labels)), remarks, rejected
-
-
-def _more(count: int) -> str:
-    return f" and {count} more" if count > 0 else ""
