@@ -12,7 +12,8 @@ from dynamixel_emulator.servo import EmulatedServo
 from paramove.cli.main import build
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
 from paramove.demonstrations.kinesthetic_teaching import KinestheticTeacher
-from paramove.demonstrations.taught_set import PARAMETERS, moved_part
+from paramove.demonstrations.movement import TARGET_NAMES
+from paramove.demonstrations.taught_set import moved_part
 from paramove.motion.reaching_file import load_reaching_model
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.motion.timing import minimum_jerk
@@ -109,7 +110,7 @@ def test_a_set_of_all_segments_is_written(taught):
         9,
         ("reaching",),
         ("ann",),
-        PARAMETERS,
+        TARGET_NAMES,
     )
     assert shown.frame == "arm_base"
     for movement, target in zip(shown, TARGETS, strict=True):

@@ -1,4 +1,5 @@
 from .arm import POINT_NAMES as POINT_NAMES
+from .arm import UPWARD as UPWARD
 from .arm import ArmLengths as ArmLengths
 from .arm import ArmPath as ArmPath
 from .arm import across as across
@@ -32,11 +33,13 @@ from .labels import Segment as Segment
 from .labels import load_labels as load_labels
 from .movement import AXIS_ENDINGS as AXIS_ENDINGS
 from .movement import POINTS_FIRST as POINTS_FIRST
+from .movement import TARGET_NAMES as TARGET_NAMES
 from .movement import DemonstrationError as DemonstrationError
 from .movement import Movement as Movement
+from .movement import Side as Side
+from .movement import at_times as at_times
 from .movement import position_in_theta as position_in_theta
 from .movement_ends import FRAMES as FRAMES
-from .movement_ends import at_times as at_times
 from .movement_ends import last_parts as last_parts
 from .plots import plot_set as plot_set
 from .plots import write_plot as write_plot
@@ -64,7 +67,6 @@ from .synthetic import RESTING_HAND as RESTING_HAND
 from .synthetic import RESTING_SHOULDER as RESTING_SHOULDER
 from .synthetic import RESTING_STERNUM as RESTING_STERNUM
 from .synthetic import SAMPLE_RATE_HZ as SAMPLE_RATE_HZ
-from .synthetic import UPWARD as UPWARD
 from .synthetic import Action as Action
 from .synthetic import Demonstrator as Demonstrator
 from .synthetic import Timing as Timing

@@ -10,7 +10,7 @@ import numpy as np
 from paramove.documents import Floats
 
 POINT_NAMES = ("sternum", "shoulder", "elbow", "wrist", "knuckle", "index", "thumb")
-UP = np.array([0.0, 0.0, 1.0])
+UPWARD = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def body_points(path: ArmPath, lengths: ArmLengths) -> Floats:
     forearm = unit(path.effector - elbow)
     wrist = elbow + lengths.forearm * forearm
     forward = across(np.broadcast_to(np.array([1.0, 0.0, 0.0]), forearm.shape), forearm)
-    leftward = np.cross(UP, forearm)
+    leftward = np.cross(UPWARD, forearm)
     opening = across((1.0 - path.facing)[:, None] * forward + path.facing[:, None] * leftward, forearm)
     along, sideways = hand_shape(path.aperture, path.pointing, lengths)
     hand = wrist[None] + along[:, :, None] * forearm[None] + sideways[:, :, None] * opening[None]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.demonstrations.movement import runs
+from paramove.demonstrations.movement import at_times, runs
 from paramove.documents import Floats
 
 NEIGHBOURS = 5
@@ -78,7 +78,7 @@ def fill_gaps(
 
 def _between(time: Floats, path: Floats, around: NDArray[np.intp], new_time: Floats) -> Floats:
     if len(around) < 4:
-        return np.stack([np.interp(new_time, time[around], path[around, axis]) for axis in range(3)], axis=-1)
+        return at_times(new_time, time[around], path[around])
     from scipy.interpolate import CubicSpline  # a third of a second, which only a gap should cost
 
     result: Floats = CubicSpline(time[around], path[around])(new_time)

@@ -9,7 +9,7 @@ import numpy as np
 
 from paramove.demonstrations.gaps import fill_gaps
 from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, append_segments, load_labels, write_labels
-from paramove.demonstrations.movement import DemonstrationError, Movement
+from paramove.demonstrations.movement import TARGET_NAMES, DemonstrationError, Movement, at_times
 from paramove.demonstrations.pose_recording import read_poses
 from paramove.demonstrations.reading import fault_in_recording
 from paramove.demonstrations.timing import FINGERTIP, fast_parts, speeds
@@ -33,7 +33,7 @@ def movements_by_speed(
     valid = np.isfinite(path).all(axis=1)
     if valid.sum() < 2:
         raise DemonstrationError(f"{point} is valid in {valid.sum()} frames; no movement can be detected from it")
-    whole = np.stack([np.interp(time, time[valid], path[valid, axis]) for axis in range(3)], axis=-1)
+    whole = at_times(time, time[valid], path[valid])
     movement = Movement(time - time[0], whole[:, None, :], (point,), "", "any", np.zeros(0))
     return [(first, min(end + 1, len(time))) for first, end in fast_parts(speeds(movement, point))]
 
@@ -86,5 +86,5 @@ def _names(segments: Sequence[Segment], given: Sequence[str] | None) -> Sequence
         return given
     count = len(segments[0].theta) if segments else 0
     if count == 3:
-        return ("target_x", "target_y", "target_z")
+        return TARGET_NAMES
     return [f"parameter_{number}" for number in range(1, count + 1)]

@@ -1,4 +1,4 @@
-"""One labelled movement of an arm, and its checks."""
+"""One labelled movement of an arm, its checks, and paths at other times."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from paramove.documents import Floats, InputError
 
 Side = Literal["right", "left"]
 AXIS_ENDINGS = ("_x", "_y", "_z")
+TARGET_NAMES = ("target_x", "target_y", "target_z")
+"""Parameters of a movement to a position."""
 POINTS_FIRST = ("index", "wrist", "hand")
 """Which point is drawn if none is named: the first of these that there is, else the last point."""
 
@@ -101,6 +103,11 @@ class Movement:
         if bad.any():
             return f"positions that are not finite in frames {frame_ranges(bad)}; leave these frames out"
         return "" if np.isfinite(self.theta).all() else "theta is not finite"
+
+
+def at_times(new_times: Floats, times: Floats, values: Floats) -> Floats:
+    """Values (T, D) at other times, linearly interpolated. (len(new_times), D)."""
+    return np.stack([np.interp(new_times, times, column) for column in values.T], axis=1)
 
 
 def position_in_theta(parameter_names: tuple[str, ...]) -> slice | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from paramove.demonstrations.arm import POINT_NAMES, ArmLengths
+from paramove.demonstrations.movement import at_times
 from paramove.demonstrations.synthetic import (
     RESTING_SHOULDER,
     SAMPLE_RATE_HZ,
@@ -135,8 +136,3 @@ def last_parts(
     return LastParts(
         sequences, theta, np.repeat(np.arange(persons), len(targets) * repetitions), float(np.mean(durations))
     )
-
-
-def at_times(new_times: Floats, times: Floats, values: Floats) -> Floats:
-    """Values (T, D) at other times, linearly interpolated. (len(new_times), D)."""
-    return np.stack([np.interp(new_times, times, column) for column in values.T], axis=1)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.demonstrations.arm import POINT_NAMES
+from paramove.demonstrations.movement import TARGET_NAMES
 from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER, SAMPLE_RATE_HZ, Action, Demonstrator
 from paramove.documents import Floats
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid, stored_model
@@ -51,8 +52,9 @@ def demonstrations_at(
     theta = np.repeat(np.atleast_2d(np.asarray(targets, dtype=np.float64)), repetitions, axis=0)
     sequences = [person.demonstrate(action, target, rng) for target in theta]
     duration = float(np.mean([len(sequence) - 1 for sequence in sequences]) / SAMPLE_RATE_HZ)
-    names = ("target_x", "target_y", "target_z")
-    return Demonstrations(sequences, theta, MovementDescription(action, POINT_NAMES, "m", FRAME, names, duration))
+    return Demonstrations(
+        sequences, theta, MovementDescription(action, POINT_NAMES, "m", FRAME, TARGET_NAMES, duration)
+    )
 
 
 def reaching_grid_demonstrations(

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from paramove.demonstrations.body_frame import chain_length
+from paramove.demonstrations.movement import at_times
 from paramove.documents import Floats, InputError, Ints, read_arrays
 
 VARIABLE = "PARAMOVE_DATA"
@@ -278,8 +279,7 @@ def _in_body_frame(
     points = (raw.points - origin) * mirror * scale
     times = raw.times - raw.times[0]
     grid = np.arange(0.0, times[-1] + 1e-9, 1.0 / rate_hz)
-    flat = points.reshape(len(points), -1)
-    uniform = np.stack([np.interp(grid, times, column) for column in flat.T], axis=1)
+    uniform = at_times(grid, times, points.reshape(len(points), -1))
 
     def frames(pair: Any) -> tuple[int, int]:
         begin = round(float(times[pair[0]]) * rate_hz)

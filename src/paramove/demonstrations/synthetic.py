@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.demonstrations.arm import ArmLengths, ArmPath, body_points, swivel_towards
+from paramove.demonstrations.arm import UPWARD, ArmLengths, ArmPath, body_points, swivel_towards
 from paramove.documents import Floats
 from paramove.hmm import minimum_jerk
 
@@ -214,9 +214,6 @@ def arc(base: Floats, reached: Floats, sway_low: Floats, sway_high: Floats, prog
     s = progress[:, None]
     result: Floats = (1 - s) ** 3 * base + 3 * s * (1 - s) ** 2 * lifted + 3 * s**2 * (1 - s) * above + s**3 * reached
     return result
-
-
-UPWARD = np.array([0.0, 0.0, 1.0])
 
 
 def leaning(target: Floats, arm_length: float) -> Floats:

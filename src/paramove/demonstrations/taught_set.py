@@ -12,11 +12,10 @@ from pydantic import ValidationError
 
 from paramove.demonstrations.labelling import next_repetition
 from paramove.demonstrations.labels import FILE_NAME, Segment, load_labels
-from paramove.demonstrations.movement import DemonstrationError
+from paramove.demonstrations.movement import TARGET_NAMES, DemonstrationError
 from paramove.demonstrations.writing import Label, Take, write_set
 from paramove.documents import Floats, findings, replacing
 
-PARAMETERS = ("target_x", "target_y", "target_z")
 RECORDING = "taught_{:03d}.mcap"
 
 
@@ -59,9 +58,9 @@ class TaughtSet:
                 f"{self._folder} holds a demonstration set already; choose another folder, or --append to it"
             )
         has = tuple(load_labels(self._labels).file.parameters)
-        if has != PARAMETERS:
+        if has != TARGET_NAMES:
             raise DemonstrationError(
-                f"{self._labels} has the parameters ({', '.join(has)}), teaching gives ({', '.join(PARAMETERS)}); "
+                f"{self._labels} has the parameters ({', '.join(has)}), teaching gives ({', '.join(TARGET_NAMES)}); "
                 "choose another folder"
             )
 
@@ -82,7 +81,7 @@ class TaughtSet:
         label = Label(*moved, self._action, where, self._subject, self._repetition(where))
         take = Take(self._free_name(), time - time[0], positions, point_names, frame, (label,))
         before = self._labels.read_bytes() if self._labels.exists() else None
-        write_set(self._folder, [take], PARAMETERS, self._description, add=True)
+        write_set(self._folder, [take], TARGET_NAMES, self._description, add=True)
         self._before.append(before)
         self.written.append(take.recording)
         return take.recording

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from paramove.demonstrations.movement import DemonstrationError, Movement
+from paramove.demonstrations.movement import DemonstrationError, Movement, at_times
 from paramove.documents import Floats
 
 FINGERTIP = "index"
@@ -48,8 +48,8 @@ def speeds(movement: Movement, point: str = FINGERTIP) -> Floats:
     path = movement.point(point)
     period = float(np.median(np.diff(movement.time)))
     count = int(np.floor(movement.duration / period + 1e-6)) + 1
-    even = np.arange(count) * period  # the filter needs equal steps, recordings may have others
-    spaced = np.stack([np.interp(even, movement.time, path[:, axis]) for axis in range(3)], axis=-1)
+    even = np.arange(count, dtype=np.float64) * period  # the filter needs equal steps, recordings may have others
+    spaced = at_times(even, movement.time, path)
     window = min(2 * round(0.5 * SPEED_WINDOW / period) + 1, count - 1 + count % 2)
     if window < 3:
         velocity: Floats = np.asarray(np.gradient(spaced, period, axis=0), dtype=np.float64)

@@ -5,8 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from paramove.demonstrations.importing import ImportOptions, read_mapping_file
-from paramove.demonstrations.importing.conversion import axes_matrix, converted
-from paramove.demonstrations.importing.raw import RawTake
+from paramove.demonstrations.importing.conversion import RawTake, axes_matrix, converted
 from paramove.demonstrations.movement import DemonstrationError
 from paramove.demonstrations.writing import Label
 

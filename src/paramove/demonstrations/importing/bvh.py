@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paramove.demonstrations import DemonstrationError
-from paramove.demonstrations.importing.raw import RawTake
+from paramove.demonstrations.importing.conversion import RawTake
 from paramove.documents import Floats, read_text
 
 MAX_LEVELS = 200

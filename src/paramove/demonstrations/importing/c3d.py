@@ -15,7 +15,7 @@ import numpy as np
 
 from paramove.demonstrations import DemonstrationError
 from paramove.demonstrations.importing import c3d_process
-from paramove.demonstrations.importing.raw import RawTake
+from paramove.demonstrations.importing.conversion import RawTake
 from paramove.documents import read_arrays, size_of
 
 TIME_LIMIT_S = 120.0

@@ -11,8 +11,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from paramove.demonstrations import DemonstrationError, Take, position_in_theta, recording_name
-from paramove.demonstrations.importing.raw import RawTake
+from paramove.demonstrations import DemonstrationError, Label, Take, position_in_theta, recording_name
 from paramove.documents import Floats, closest, nearest, read_document
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -31,6 +30,31 @@ DIRECTIONS = {
 }
 PRESETS = {"z_up": "forward,left,up", "y_up": "left,up,forward"}
 """z_up: x forward, y left (Vicon, Qualisys). y_up: x left, z forward (BVH, OptiTrack)."""
+
+
+@dataclass(frozen=True)
+class RawTake:
+    """Frames that were captured one after the other, in the unit, axes and names of their file.
+
+    Attributes:
+        name: For the recording that it becomes a part of.
+        time: Shape (T,), s; None if the file has neither times nor a rate.
+        positions: Shape (T, P, 3), in the file's unit and axes; NaN where a point was lost.
+        point_names: Of the P points, as the file has them.
+        unit: "m", "cm", "mm"; None if the file does not define it.
+        axes: Directions of x, y, z as `axes_matrix` takes them; None if the file does not define it.
+        labels: The file's labels of movements; positions in theta are in the file's unit and axes.
+        parameter_names: Of theta.
+    """
+
+    name: str
+    time: Floats | None
+    positions: Floats
+    point_names: tuple[str, ...]
+    unit: str | None = None
+    axes: str | None = None
+    labels: tuple[Label, ...] = ()
+    parameter_names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from paramove.demonstrations import DemonstrationError
-from paramove.demonstrations.importing.raw import RawTake
+from paramove.demonstrations.importing.conversion import RawTake
 from paramove.documents import Floats, size_of, unreadable
 
 COLUMN = re.compile(r"(.+?)[ _.:/-]?([xyz])", re.IGNORECASE)

@@ -20,10 +20,9 @@ from paramove.demonstrations import (
 )
 from paramove.demonstrations.importing.bvh import read_bvh
 from paramove.demonstrations.importing.c3d import read_c3d
-from paramove.demonstrations.importing.conversion import ImportOptions, converted
+from paramove.demonstrations.importing.conversion import ImportOptions, RawTake, converted
 from paramove.demonstrations.importing.csv_file import read_csv
 from paramove.demonstrations.importing.npz import read_npz
-from paramove.demonstrations.importing.raw import RawTake
 
 READERS: dict[str, Callable[[Path], list[RawTake]]] = {
     ".c3d": read_c3d,

@@ -13,12 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from paramove.demonstrations import DemonstrationError, Label
-from paramove.demonstrations.importing.raw import RawTake
+from paramove.demonstrations import TARGET_NAMES, DemonstrationError, Label, Side
+from paramove.demonstrations.importing.conversion import RawTake
 from paramove.documents import Floats, read_arrays
 
-TARGET = ("target_x", "target_y", "target_z")
-SIDES = {"L": "left", "R": "right", "left": "left", "right": "right"}
+SIDES: dict[str, Side] = {"L": "left", "R": "right", "left": "left", "right": "right"}
 Arrays = dict[str, Any]
 
 
@@ -90,7 +89,6 @@ def _take(path: Path, arrays: Arrays, number: int, positions: Floats, names: tup
             "expected its first frame and one past its last"
         )
     subject = str(arrays["subject"][number])
-    side = SIDES[str(arrays["hand"][number])] if "hand" in arrays else "right"
     label = Label(
         first,
         last,
@@ -98,7 +96,7 @@ def _take(path: Path, arrays: Arrays, number: int, positions: Floats, names: tup
         tuple(float(value) for value in arrays["target"][number]),
         subject,
         int(arrays["repetition"][number]),
-        "left" if side == "left" else "right",
+        SIDES[str(arrays["hand"][number])] if "hand" in arrays else "right",
     )
     unit, axes = str(arrays["unit"]), str(arrays["axes"])
-    return RawTake(f"{path.stem}_subject_{subject}", time, positions, names, unit, axes, (label,), TARGET)
+    return RawTake(f"{path.stem}_subject_{subject}", time, positions, names, unit, axes, (label,), TARGET_NAMES)
