@@ -41,7 +41,9 @@ from .movement import at_times as at_times
 from .movement import position_in_theta as position_in_theta
 from .movement_ends import FRAMES as FRAMES
 from .movement_ends import last_parts as last_parts
+from .plots import new_figure as new_figure
 from .plots import plot_set as plot_set
+from .plots import space_axes as space_axes
 from .plots import write_plot as write_plot
 from .pose_recording import BILLION as BILLION
 from .pose_recording import PoseRecording as PoseRecording

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -36,25 +37,48 @@ def plot_set(dataset: DemonstrationSet, point: str | None = None, colour_by: str
         raise DemonstrationError("there is no movement to draw")
     name = point or next((one for one in POINTS_FIRST if one in dataset.point_names), dataset.point_names[-1])
     values, title = _colour_values(dataset, colour_by)
-    figure = Figure(figsize=FIGURE_IN, layout="constrained")
-    FigureCanvasAgg(figure)
+    paths = [movement.point(name) for movement in dataset]
+    figure = new_figure(*FIGURE_IN)
     grid = figure.add_gridspec(3, 2, width_ratios=[1.15, 1.0])
-    space = figure.add_subplot(grid[:, 0], projection="3d")
+    space = space_axes(figure, grid[:, 0], paths, f"path of {name}, frame '{dataset.frame}'")
     over_time = [figure.add_subplot(grid[row, 1]) for row in range(3)]
     norm = Normalize(float(values.min()), float(max(values.max(), values.min() + 1e-9)))
     colours = colormaps[COLOURS](norm(values))
-    for movement, colour in zip(dataset, colours, strict=True):
-        path = movement.point(name)
+    for movement, path, colour in zip(dataset, paths, colours, strict=True):
         space.plot(*path.T, color=colour, linewidth=0.9, alpha=0.8)
         for axis, axes in enumerate(over_time):
             axes.plot(movement.time, path[:, axis], color=colour, linewidth=0.9, alpha=0.8)
-    _dress(space, over_time, dataset, name)
+    for letter, axes in zip("xyz", over_time, strict=True):
+        axes.set_ylabel(f"{name} {letter}, m")
+        axes.grid(alpha=0.3)
+    over_time[-1].set_xlabel("time, s")
     if title == "action":
         _legend(space, dataset, values, colours)
     else:
         figure.colorbar(ScalarMappable(norm, COLOURS), ax=over_time, label=title, pad=0.02)
     figure.suptitle(_title(dataset), fontsize=11)
     return figure
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty figure that needs no display."""
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def space_axes(figure: Figure, cell: Any, paths: Sequence[Floats], title: str) -> Any:
+    """Axes in 3D with equal scales that hold the paths (T, 3)."""
+    axes: Any = figure.add_subplot(cell, projection="3d")
+    low = np.min([path.min(axis=0) for path in paths], axis=0)
+    high = np.max([path.max(axis=0) for path in paths], axis=0)
+    middle, half = 0.5 * (low + high), 0.5 * float(np.max(high - low)) + 1e-3
+    for number, axis in enumerate("xyz"):  # equal scales, so that a circle is one
+        getattr(axes, f"set_{axis}lim")(middle[number] - half, middle[number] + half)
+        getattr(axes, f"set_{axis}label")(f"{axis}, m")
+    axes.set_box_aspect((1.0, 1.0, 1.0))
+    axes.set_title(title, fontsize=10)
+    return axes
 
 
 def write_plot(figure: Figure, path: Path, about: str = "") -> None:
@@ -89,21 +113,7 @@ def _colour_values(dataset: DemonstrationSet, colour_by: str | None) -> tuple[Fl
     return np.array(numbers, dtype=np.float64), "action"
 
 
-def _dress(space: Axes, over_time: list[Axes], dataset: DemonstrationSet, name: str) -> None:
-    low = np.min([movement.point(name).min(axis=0) for movement in dataset], axis=0)
-    high = np.max([movement.point(name).max(axis=0) for movement in dataset], axis=0)
-    middle, half = 0.5 * (low + high), 0.5 * float(np.max(high - low)) + 1e-3
-    for number, axis in enumerate("xyz"):  # equal scales, so that a circle is one
-        getattr(space, f"set_{axis}lim")(middle[number] - half, middle[number] + half)
-        getattr(space, f"set_{axis}label")(f"{axis}, m")
-        over_time[number].set_ylabel(f"{name} {axis}, m")
-        over_time[number].grid(alpha=0.3)
-    space.set_box_aspect((1.0, 1.0, 1.0))  # type: ignore[arg-type]  # in 3D it takes three
-    space.set_title(f"path of {name}, frame '{dataset.frame}'", fontsize=10)
-    over_time[-1].set_xlabel("time, s")
-
-
-def _legend(space: Axes, dataset: DemonstrationSet, values: Floats, colours: Floats) -> None:
+def _legend(space: Any, dataset: DemonstrationSet, values: Floats, colours: Floats) -> None:
     for number, action in enumerate(dataset.actions):
         colour = colours[int(np.flatnonzero(values == number)[0])]
         space.plot([], [], [], color=colour, label=action)

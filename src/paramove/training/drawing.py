@@ -1,9 +1,8 @@
-"""Parts of the pictures of models: axes, paths in space, ellipses, grids of theta."""
+"""Parts of the pictures of models: points, names, ellipses, grids of theta."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,7 +15,6 @@ from paramove.training.examples import is_place
 
 if TYPE_CHECKING:  # matplotlib takes half a second, which only those who draw should wait
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 COLOURS = "viridis"
 INK, FAINT, WARN = "#1d2530", "#aab3bd", "#b3372b"
@@ -90,30 +88,6 @@ def grid(low_high: Floats) -> Floats:
     count = LINES.get(low_high.shape[1], 2)
     lines = [np.unique(np.linspace(low, high, count)) for low, high in low_high.T]
     return np.array(list(itertools.product(*lines)))
-
-
-def new_figure(width_in: float, height_in: float) -> Figure:
-    """An empty figure that needs no display."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width_in, height_in), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def space_axes(figure: Figure, cell: Any, paths: Sequence[Floats], title: str) -> Any:
-    """Axes in 3D with equal scales that hold the paths (T, 3)."""
-    axes: Any = figure.add_subplot(cell, projection="3d")
-    low = np.min([path.min(axis=0) for path in paths], axis=0)
-    high = np.max([path.max(axis=0) for path in paths], axis=0)
-    middle, half = 0.5 * (low + high), 0.5 * float(np.max(high - low)) + 1e-3
-    for number, axis in enumerate("xyz"):
-        getattr(axes, f"set_{axis}lim")(middle[number] - half, middle[number] + half)
-        getattr(axes, f"set_{axis}label")(f"{axis}, m")
-    axes.set_box_aspect((1.0, 1.0, 1.0))
-    axes.set_title(title, fontsize=10)
-    return axes
 
 
 def add_ellipse(

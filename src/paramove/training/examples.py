@@ -97,21 +97,18 @@ class Examples:
 
     def description(self, action: str) -> MovementDescription:
         """The description that is stored with a model of one action."""
-        seconds = [(len(x) - 1) / self.rate_hz for x, label in zip(self.sequences, self.labels, strict=True)
-                   if label == action]  # fmt: skip
+        own = self.of_action(action)
+        seconds = [(len(sequence) - 1) / self.rate_hz for sequence in own.sequences]
         return MovementDescription(
             action=action, point_names=self.point_names, unit="m", frame=self.frame,
             parameter_names=self.parameter_names, duration=float(np.mean(seconds)), source=self.source,
-            rate_hz=self.rate_hz, arrival=1.0 if self._of_action(action)._ends_at_theta else -1.0,
+            rate_hz=self.rate_hz, arrival=1.0 if own._ends_at_theta else -1.0,
         )  # fmt: skip
-
-    def _of_action(self, action: str) -> Examples:
-        return self.of([number for number, label in enumerate(self.labels) if label == action])
 
     @property
     def _ends_at_theta(self) -> bool:
         """Whether the fingertip, or the middle of fingers and knuckle, always ends at theta."""
-        if not all(name[-2:] in AXIS_ENDINGS for name in self.parameter_names):
+        if not all(is_place(name) for name in self.parameter_names):
             return False
         axes = [AXIS_ENDINGS.index(name[-2:]) for name in self.parameter_names]
         ends = np.array([sequence[-1] for sequence in self.sequences]).reshape(len(self), -1, 3)[..., axes]

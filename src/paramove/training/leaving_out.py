@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -172,8 +172,3 @@ def synthesis_error(model: ParametricHMM, theta: Floats, sequence: Floats, n_poi
     """Root mean square distance of body points between the synthesis for theta and a recording (T, D), warped."""
     synthesised = model.synthesize(theta, FRAMES)
     return movement_distance(synthesised, resample(sequence, FRAMES), n_points=n_points, cut=0.0)
-
-
-def worst(result: LeaveOutResult, count: int) -> Sequence[LeftOut]:
-    """The movements with the largest errors of synthesis, worst first."""
-    return sorted(result.movements, key=lambda one: -one.synthesis)[:count]

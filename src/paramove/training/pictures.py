@@ -11,6 +11,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from paramove.demonstrations import new_figure, space_axes
 from paramove.documents import Floats
 from paramove.hmm import expected_durations
 from paramove.phmm import ParametricHMM
@@ -25,10 +26,8 @@ from paramove.training.drawing import (
     bounds,
     drawn_point,
     grid,
-    new_figure,
     parameter_names,
     point_names,
-    space_axes,
     with_unit,
 )
 from paramove.training.kinds import kind_of

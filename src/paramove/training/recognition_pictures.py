@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from paramove.demonstrations import new_figure, space_axes
 from paramove.phmm import ParametricHMM
 from paramove.training.drawing import (
     ACTION_COLOURS,
@@ -20,8 +21,6 @@ from paramove.training.drawing import (
     bounds,
     drawn_point,
     grid,
-    new_figure,
-    space_axes,
     with_unit,
 )
 from paramove.training.examining import SIGNIFICANCE_LEVEL, Recognition, confusion, percent

@@ -12,9 +12,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from paramove.demonstrations import new_figure
 from paramove.documents import image, report_page
-from paramove.training.drawing import ACTION_COLOURS, INK, WARN, bounds, new_figure, with_unit
-from paramove.training.leaving_out import LeaveOutResult, worst
+from paramove.training.drawing import ACTION_COLOURS, INK, WARN, bounds, with_unit
+from paramove.training.leaving_out import LeaveOutResult
 from paramove.training.pictures import plot_model
 from paramove.training.training import Trained
 
@@ -159,7 +160,7 @@ def _left_out(trained: Trained, result: LeaveOutResult) -> Figure:
 def _worst(trained: Trained, result: LeaveOutResult) -> str:
     heads = "".join(f"<th class=n>{escape(with_unit(name))}</th>" for name in result.parameter_names)
     lines = []
-    for one in worst(result, WORST):
+    for one in sorted(result.movements, key=lambda one: -one.synthesis)[:WORST]:
         cells = "".join(
             f"<td class=n>{true:.3f} → {estimated:.3f}</td>"
             for true, estimated in zip(one.theta, one.estimated, strict=True)
