@@ -6,7 +6,6 @@ from numpy.testing import assert_allclose
 
 from paramove.demonstrations import (
     POINT_NAMES,
-    BlendTiming,
     Demonstrator,
     Variation,
     blended,
@@ -100,7 +99,5 @@ def test_what_cannot_be_blended_is_refused() -> None:
     movement = exact.demonstrate("pointing", table_place([0.5, 0.5]), np.random.default_rng(0))
     with pytest.raises(ValueError, match="dimensions, found 21 and 20"):
         blended(movement, movement[:, :20])
-    with pytest.raises(ValueError, match="crossing and stillness lie between 0 and 1"):
-        BlendTiming(crossing=1.0)
     with pytest.raises(ValueError, match="start_u"):
         redirect_demonstrations([0.0, 1.0], np.random.default_rng(0))

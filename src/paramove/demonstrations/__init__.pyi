@@ -7,7 +7,6 @@ from .arm import body_points as body_points
 from .arm import elbow_positions as elbow_positions
 from .arm import swivel_towards as swivel_towards
 from .arm import unit as unit
-from .blending import BlendTiming as BlendTiming
 from .blending import blended as blended
 from .blending import corner_pairs as corner_pairs
 from .blending import nine_pairs as nine_pairs

@@ -4,7 +4,6 @@ A redirect action points at one position on the table, then at another; theta = 
 blended from two pointing movements, either synthesised by a parametric HMM, as in the thesis, or demonstrated.
 """
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -21,55 +20,41 @@ from paramove.phmm import InterpolativePHMM, MovementDescription, ParametricHMM
 ALIGNED_FRAMES = 200
 SMOOTHED_FRAMES = 7  # over which speed is measured; noise of a sensor is slower then
 PARAMETER_NAMES = ("start_u", "start_v", "end_u", "end_v")
+CROSSING = 0.36
+"""Fraction of the whole movement between arriving at the first position and leaving the second."""
+PAUSE = 0.12
+"""Fraction of the crossing during which the hand rests at each of the two positions."""
+STILLNESS = 0.1
+"""A movement is at its position while it is slower than this fraction of its maximum speed."""
 
 
-@dataclass(frozen=True)
-class BlendTiming:
-    """Timing of the transition between the two positions.
-
-    Attributes:
-        crossing: fraction of the whole movement between arriving at the first position and leaving the second.
-        pause: fraction of the crossing during which the hand rests at each of the two positions.
-        stillness: a movement is at its position while it is slower than this fraction of its maximum speed.
-    """
-
-    crossing: float = 0.36
-    pause: float = 0.12
-    stillness: float = 0.1
-
-    def __post_init__(self) -> None:
-        if not (0.0 < self.crossing < 1.0 and 0.0 <= self.pause < 0.5 and 0.0 < self.stillness < 1.0):
-            raise ValueError(f"crossing and stillness lie between 0 and 1, pause below 0.5, found {self}")
-
-
-def blended(first: ArrayLike, second: ArrayLike, n_samples: int = 80, timing: BlendTiming | None = None) -> Floats:
+def blended(first: ArrayLike, second: ArrayLike, n_samples: int = 80) -> Floats:
     """Out as in the first movement, over to the second's position, back as in the second. (T_1, D), (T_2, D) -> (n, D).
 
     Both movements go out from a base pose, stay at a position and return. They are aligned by dynamic time warping of
     their phases, not of their points: they go to different positions. The weight of the second rises from 0 to 1 with
     minimum jerk while both are at their positions. Raises ValueError where a movement never stays or dimensions differ.
     """
-    chosen = timing if timing is not None else BlendTiming()
     p, q = checked_sequence(first), checked_sequence(second)
     if p.shape[1] != q.shape[1]:
         raise ValueError(f"movements to blend have equally many dimensions, found {p.shape[1]} and {q.shape[1]}")
     p, q = resample(p, ALIGNED_FRAMES), resample(q, ALIGNED_FRAMES)
-    phases = [phase(one, chosen.stillness) for one in (p, q)]
+    phases = [phase(one) for one in (p, q)]
     alignment = warp(phases[0][:, None], phases[1][:, None], "B")  # which never halts one of the movements
     p, q = p[alignment.first], q[alignment.second]
     together = phases[0][alignment.first] + phases[1][alignment.second]
     arrived, leaves = np.searchsorted(together, [2.0, 4.0])
     progress = np.linspace(0.0, 1.0, n_samples)
-    begin = float((1.0 - chosen.crossing) * arrived / (arrived + len(p) - leaves))
-    end = begin + chosen.crossing
+    begin = float((1.0 - CROSSING) * arrived / (arrived + len(p) - leaves))
+    end = begin + CROSSING
     positions = np.interp(progress, [0.0, begin, end, 1.0], [0.0, arrived, leaves - 1.0, len(p) - 1.0])
-    rest = chosen.pause * chosen.crossing
+    rest = PAUSE * CROSSING
     weight = minimum_jerk(progress, begin + rest, end - rest)[:, None]
     result: Floats = (1.0 - weight) * interpolate(p, positions) + weight * interpolate(q, positions)
     return result
 
 
-def phase(movement: Floats, stillness: float = 0.1) -> Floats:
+def phase(movement: Floats) -> Floats:
     """0 to 1 going out, to 2 at the position, to 3 returning: by path length, at the position by time. Shape (T,).
 
     The position is where a movement (T, D) is slowest in its middle half. Raises ValueError if it is not still there.
@@ -77,14 +62,14 @@ def phase(movement: Floats, stillness: float = 0.1) -> Floats:
     reach = SMOOTHED_FRAMES // 2
     padded = np.pad(movement, ((reach, reach), (0, 0)), mode="edge")
     speed = np.linalg.norm(padded[2 * reach :] - padded[: -2 * reach], axis=1)
-    moving = np.flatnonzero(speed >= stillness * speed.max())
+    moving = np.flatnonzero(speed >= STILLNESS * speed.max())
     quarter = len(movement) // 4
     stillest = quarter + int(speed[quarter:-quarter].argmin())
     before, after = moving[moving < stillest], moving[moving > stillest]
     if len(before) == 0 or len(after) == 0 or after[0] - before[-1] < 4:
         raise ValueError(
             f"a movement to blend goes out, stays at a position and returns; in the middle half it is never below "
-            f"{stillness:g} of its largest speed for three frames; raise `stillness`"
+            f"{STILLNESS:g} of its largest speed for three frames: demonstrate a longer stay"
         )
     arrived, leaves = int(before[-1]) + 1, int(after[0]) - 1
     length = np.cumsum(speed)
@@ -130,12 +115,11 @@ def redirect_demonstrations(
     theta: ArrayLike,
     rng: np.random.Generator,
     *,
-    repetitions: int = 1,
     n_samples: int = 80,
     demonstrator: Demonstrator | None = None,
 ) -> Demonstrations:
     """Redirect movements for theta (K, 4), each blended from two pointing movements demonstrated for it."""
-    pairs = np.repeat(checked_pairs(theta), repetitions, axis=0)
+    pairs = checked_pairs(theta)
     sequences = []
     for pair in pairs:
         targets = table_place(pair.reshape(2, 2))
@@ -164,5 +148,5 @@ def checked_pairs(theta: ArrayLike) -> Floats:
 
 def _described(source: str) -> MovementDescription:
     usual = Timing()
-    duration = usual.duration * (1.0 - usual.leave + usual.arrive) / (1.0 - BlendTiming().crossing)
+    duration = usual.duration * (1.0 - usual.leave + usual.arrive) / (1.0 - CROSSING)
     return MovementDescription("redirect", POINT_NAMES, "m", FRAME, PARAMETER_NAMES, duration, source=source)

@@ -5,8 +5,9 @@ It splits into training and test sets by movement, person or parameter cell; the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeVar
 
@@ -53,7 +54,7 @@ def split_groups(
             chosen.sort(key=lambda n: _identity(movements[n]))
             tested.update(_drawn(chosen, fraction, rng, f"movements of {action}"))
     else:
-        group = _subject if by == "subject" else _cells(movements, bins)
+        group: Callable[[Movement], Hashable] = attrgetter("subject") if by == "subject" else _cells(movements, bins)
         groups = sorted({group(movement) for movement in movements}, key=repr)
         drawn = set(_drawn(groups, fraction, rng, "persons" if by == "subject" else "parameter cells"))
         tested = {n for n, movement in enumerate(movements) if group(movement) in drawn}
@@ -64,10 +65,6 @@ def _identity(movement: Movement) -> tuple[object, ...]:
     """Key that identifies a movement of an action, independent of their order."""
     labels = (movement.subject, movement.side, tuple(movement.theta.tolist()), movement.repetition)
     return (*labels, len(movement.time), movement.positions[0].tobytes(), movement.positions[-1].tobytes())
-
-
-def _subject(movement: Movement) -> Hashable:
-    return movement.subject
 
 
 def _cells(movements: Sequence[Movement], bins: int | None) -> Callable[[Movement], Hashable]:
@@ -175,9 +172,6 @@ class DemonstrationSet(Sequence[Movement]):
     def __getitem__(self, index: int) -> Movement:  # type: ignore[override]
         return self.movements[index]
 
-    def __iter__(self) -> Iterator[Movement]:
-        return iter(self.movements)
-
     @property
     def point_names(self) -> tuple[str, ...]:
         """Names of the points; () of an empty set."""
@@ -278,7 +272,7 @@ class DemonstrationSet(Sequence[Movement]):
     def split(
         self, by: SplitBy = "movement", fraction: float = 0.25, seed: int = 0, bins: int | None = None
     ) -> tuple[DemonstrationSet, DemonstrationSet]:
-        """The set to train with and the set to test with (`splitting.split_groups`)."""
+        """The set to train with and the set to test with (`split_groups`)."""
         trained, tested = split_groups(self.movements, by, fraction, seed, bins)
         return (
             replace(self, movements=tuple(self.movements[n] for n in trained)),

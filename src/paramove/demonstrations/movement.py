@@ -120,10 +120,10 @@ def position_in_theta(parameter_names: tuple[str, ...]) -> slice | None:
     return None
 
 
-def frame_ranges(marked: NDArray[np.bool_], first: int = 0, maximum: int = 6) -> str:
-    """Marked frames as text: '3-7, 12'; ranges beyond `maximum` are counted."""
-    ranges = [f"{a + first}" if b - a == 1 else f"{a + first}-{b - 1 + first}" for a, b in runs(marked)]
-    return ", ".join(ranges[:maximum]) + (f" and {len(ranges) - maximum} more ranges" if len(ranges) > maximum else "")
+def frame_ranges(marked: NDArray[np.bool_]) -> str:
+    """Marked frames as text: '3-7, 12'; ranges beyond the sixth are counted."""
+    ranges = [f"{first}" if end - first == 1 else f"{first}-{end - 1}" for first, end in runs(marked)]
+    return ", ".join(ranges[:6]) + (f" and {len(ranges) - 6} more ranges" if len(ranges) > 6 else "")
 
 
 def runs(marked: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -57,12 +57,9 @@ def demonstrations_at(
     )
 
 
-def reaching_grid_demonstrations(
-    rng: np.random.Generator, *, grid: ParameterGrid | None = None, repetitions: int = 10, action: Action = "reaching"
-) -> Demonstrations:
-    """Movements to every point of a 3D grid, by default the eight corners of `reaching_cuboid`."""
-    targets = (grid if grid is not None else reaching_cuboid()).points()
-    return demonstrations_at(targets, rng, action=action, repetitions=repetitions)
+def reaching_grid_demonstrations(rng: np.random.Generator, *, repetitions: int = 10) -> Demonstrations:
+    """Movements to the eight corners of `reaching_cuboid`."""
+    return demonstrations_at(reaching_cuboid().points(), rng, repetitions=repetitions)
 
 
 def train_reaching_model(

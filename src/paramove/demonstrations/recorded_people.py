@@ -165,6 +165,8 @@ def _recordings(name: str, arrays: dict[str, Any], rate_hz: float) -> Recordings
     names = tuple(str(point) for point in arrays["points"])
     chain = _chain_of(names)
     tip = _index_of(names, FINGERTIPS)
+    # With a sternum, persons may sit turned; without, the laboratory's axes are those of all persons.
+    sternum = names.index("sternum") if "sternum" in names else None
     raws = _raw_movements(arrays, len(names))
     ids = _target_ids(arrays)
     movements: list[RecordedMovement] = []
@@ -172,8 +174,8 @@ def _recordings(name: str, arrays: dict[str, Any], rate_hz: float) -> Recordings
         own = [raw for raw in raws if arrays["subject"][raw.index] == subject]
         if not own:
             continue
-        hands = [_hand_of(arrays, raw.index) for raw in own]
-        body_from_room = _facing(own, hands, chain[0], _turning(names))
+        hands = [str(arrays["hand"][raw.index]) if "hand" in arrays else "R" for raw in own]
+        body_from_room = _facing(own, hands, chain[0], sternum)
         scale = REFERENCE_ARM_M / _arm_length(own, chain)
         for raw, hand in zip(own, hands, strict=True):
             turned = replace(raw, points=raw.points @ body_from_room.T, target=body_from_room @ raw.target)
@@ -232,15 +234,6 @@ def _index_of(names: Sequence[str], choices: Sequence[str]) -> int:
         if name in names:
             return list(names).index(name)
     raise ValueError(f"one of the points {', '.join(choices)} is needed, found {tuple(names)}")
-
-
-def _hand_of(arrays: dict[str, Any], index: int) -> str:
-    return str(arrays["hand"][index]) if "hand" in arrays else "R"
-
-
-def _turning(names: Sequence[str]) -> int | None:
-    """The sternum, where persons may sit turned; None where the laboratory's axes are those of all persons."""
-    return list(names).index("sternum") if "sternum" in names else None
 
 
 def _facing(own: list[_Raw], hands: list[str], shoulder: int, sternum: int | None) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -122,12 +122,11 @@ def _reject(folder: Path, takes: Sequence[Take], parameter_names: Sequence[str],
                 raise DemonstrationError(f"{file} exists; recordings are never overwritten: give another --name")
 
 
-def _together(takes: Iterable[Take]) -> tuple[PoseRecording, list[Segment]]:
+def _together(takes: Sequence[Take]) -> tuple[PoseRecording, list[Segment]]:
     """One recording of several takes, one after the other, and the segments in it."""
     begin_ns, times, positions, segments = 0, [], [], list[Segment]()
-    first = None
+    first = takes[0]
     for take in takes:
-        first = first or take
         if (take.point_names, take.frame) != (first.point_names, first.frame):
             raise DemonstrationError(f"takes of {take.recording} differ in points or frame; give them different names")
         time_ns = begin_ns + np.rint((take.time - take.time[0]) * BILLION).astype(np.int64)
@@ -137,7 +136,6 @@ def _together(takes: Iterable[Take]) -> tuple[PoseRecording, list[Segment]]:
             start, end = (float(time_ns[frame] / BILLION) for frame in (label.first, label.end - 1))
             segments.append(_segment(take.recording, start, end, label))
         begin_ns = int(time_ns[-1]) + BETWEEN_NS
-    assert first is not None
     return PoseRecording(np.concatenate(times), np.concatenate(positions), first.point_names, first.frame), segments
 
 

@@ -20,6 +20,7 @@ from .movement_writing import Made as Made
 from .movement_writing import as_csv as as_csv
 from .movement_writing import write_movement as write_movement
 from .pictures import plot_model as plot_model
+from .pictures import plot_recognition as plot_recognition
 from .pictures import plot_synthesis as plot_synthesis
 from .pictures import state_seconds as state_seconds
 from .pictures import title_of as title_of
@@ -27,7 +28,6 @@ from .plots import coverage as coverage
 from .plots import plot_coverage as plot_coverage
 from .plots import plot_movement as plot_movement
 from .plots import plot_theta as plot_theta
-from .recognition_pictures import plot_recognition as plot_recognition
 from .report import coverage_warning as coverage_warning
 from .report import cross_validation_rows as cross_validation_rows
 from .report import sentences as sentences

@@ -10,7 +10,7 @@ from scipy.special import chdtri  # scipy.stats would take half a second to impo
 
 from paramove.demonstrations import POINTS_FIRST
 from paramove.documents import Floats, InputError, nearest
-from paramove.phmm import ParametricHMM
+from paramove.phmm import MovementDescription, ParametricHMM
 from paramove.training.examples import is_place
 
 if TYPE_CHECKING:  # matplotlib takes half a second, which only those who draw should wait
@@ -48,9 +48,14 @@ def drawn_point(model: ParametricHMM, name: str | None = None) -> DrawnPoint:
     return DrawnPoint(point, slice(first, first + 3))
 
 
+def description_of(model: ParametricHMM) -> MovementDescription:
+    """The stored description, or that of any movement."""
+    return model.description or MovementDescription()
+
+
 def point_names(model: ParametricHMM) -> tuple[str, ...]:
     """Names of the body points, as described or else numbered. Raises InputError if frames are not positions."""
-    described = model.description.point_names if model.description else ()
+    described = description_of(model).point_names
     dim = dimension(model)
     if described and 3 * len(described) == dim:
         return described
@@ -74,7 +79,7 @@ def bounds(model: ParametricHMM) -> Floats:
 def parameter_names(model: ParametricHMM) -> tuple[str, ...]:
     """Names of the components of theta, as described or else numbered."""
     count = bounds(model).shape[1]
-    described = model.description.parameter_names if model.description else ()
+    described = description_of(model).parameter_names
     return described if len(described) == count else tuple(f"parameter_{n}" for n in range(1, count + 1))
 
 

@@ -14,13 +14,12 @@ from paramove.demonstrations import BODY, DemonstrationError, Movement, in_body_
 from paramove.documents import Floats, InputError, renamed_attribute
 from paramove.phmm import (
     MovementClassifier,
-    MovementDescription,
     ParameterEstimate,
     ParametricHMM,
     UnlikelyMovementWarning,
     has_p_values,
 )
-from paramove.training.drawing import bounds, parameter_names
+from paramove.training.drawing import bounds, description_of, parameter_names
 from paramove.training.kinds import kind_of
 from paramove.training.leaving_out import REGION, covers
 
@@ -110,7 +109,7 @@ class Examiner:
                 f"these actions have no theta: {', '.join(without)}; ask MovementClassifier.load(FOLDER).classify in "
                 "Python, or train a folder of actions that have"
             )
-        self._about = [model.description or MovementDescription() for model in self.models.values()]
+        self._about = [description_of(model) for model in self.models.values()]
         for about in self._about[1:]:
             for what in ("point_names", "frame", "rate_hz"):
                 one, other = getattr(self._about[0], what), getattr(about, what)

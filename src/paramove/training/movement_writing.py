@@ -10,8 +10,8 @@ import numpy as np
 
 from paramove.demonstrations import BILLION, PoseRecording, write_poses
 from paramove.documents import Floats, replacing
-from paramove.phmm import MovementDescription, ParametricHMM
-from paramove.training.drawing import point_names
+from paramove.phmm import ParametricHMM
+from paramove.training.drawing import description_of, point_names
 
 ENDINGS = (".csv", ".npz", ".mcap")
 LIBRARY = "paramove synthesize"
@@ -38,8 +38,7 @@ class Made:
     @classmethod
     def by(cls, model: ParametricHMM, theta: Floats, time: Floats) -> Made:
         """The synthesis of a model for theta (P,) at the times (T,), s. Raises InputError if it has no body points."""
-        description = model.description or MovementDescription()
-        return cls(time, model.synthesize(theta, len(time)), point_names(model), description.frame, theta)
+        return cls(time, model.synthesize(theta, len(time)), point_names(model), description_of(model).frame, theta)
 
 
 def as_csv(made: Made) -> str:
