@@ -114,8 +114,7 @@ def body_points(path: ArmPath, lengths: ArmLengths) -> Floats:
     opening = across((1.0 - path.facing)[:, None] * forward + path.facing[:, None] * leftward, forearm)
     along, sideways = hand_shape(path.aperture, path.pointing, lengths)
     hand = wrist[None] + along[:, :, None] * forearm[None] + sideways[:, :, None] * opening[None]
-    stacked: Floats = np.concatenate([path.sternum, path.shoulder, elbow, wrist, *hand], axis=1)
-    return stacked
+    return np.concatenate([path.sternum, path.shoulder, elbow, wrist, *hand], axis=1)
 
 
 def hand_shape(aperture: Floats, pointing: Floats, lengths: ArmLengths) -> tuple[Floats, Floats]:

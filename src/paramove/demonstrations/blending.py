@@ -50,8 +50,7 @@ def blended(first: ArrayLike, second: ArrayLike, n_samples: int = 80) -> Floats:
     positions = np.interp(progress, [0.0, begin, end, 1.0], [0.0, arrived, leaves - 1.0, len(p) - 1.0])
     rest = PAUSE * CROSSING
     weight = minimum_jerk(progress, begin + rest, end - rest)[:, None]
-    result: Floats = (1.0 - weight) * interpolate(p, positions) + weight * interpolate(q, positions)
-    return result
+    return (1.0 - weight) * interpolate(p, positions) + weight * interpolate(q, positions)
 
 
 def phase(movement: Floats) -> Floats:

@@ -41,8 +41,7 @@ class PoseRecording:
     @property
     def time(self) -> Floats:
         """Capture times from that of the first pose. Shape (T,), s."""
-        result: Floats = (self.time_ns - self.time_ns[:1]) / BILLION
-        return result
+        return (self.time_ns - self.time_ns[:1]) / BILLION
 
 
 def read_poses(path: Path) -> PoseRecording:

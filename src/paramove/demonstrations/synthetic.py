@@ -191,8 +191,7 @@ def at_target(progress: Floats, timing: Timing) -> Floats:
     """How near the hand is to the target, 0 at rest, 1 at the target. Shape (T,)."""
     out = minimum_jerk(progress, timing.depart, timing.arrive)
     # The polynomial may exceed 1 by rounding, and roots are taken of what is returned.
-    result: Floats = np.maximum(out * (1.0 - minimum_jerk(progress, timing.leave, timing.home)), 0.0)
-    return result
+    return np.maximum(out * (1.0 - minimum_jerk(progress, timing.leave, timing.home)), 0.0)
 
 
 def grasping(progress: Floats, timing: Timing) -> Floats:
@@ -202,8 +201,7 @@ def grasping(progress: Floats, timing: Timing) -> Floats:
     releasing = minimum_jerk(progress, timing.release, timing.release + 0.05)
     relaxing = minimum_jerk(progress, timing.leave + 0.10, timing.home)
     aperture = RELAXED + (OPEN - RELAXED) * opening + (CLOSED - OPEN) * closing
-    result: Floats = aperture + (OPEN - CLOSED) * releasing + (RELAXED - OPEN) * relaxing
-    return result
+    return aperture + (OPEN - CLOSED) * releasing + (RELAXED - OPEN) * relaxing
 
 
 def arc(base: Floats, reached: Floats, sway_low: Floats, sway_high: Floats, progress: Floats) -> Floats:

@@ -53,8 +53,7 @@ class Topology:
         if self.name == "ergodic":
             return np.ones((n_states, n_states), dtype=bool)
         forward = np.arange(n_states)[None, :] - np.arange(n_states)[:, None]
-        result: Flags = (forward >= (0 if self.self_transitions else 1)) & (forward <= self.step)
-        return result
+        return (forward >= (0 if self.self_transitions else 1)) & (forward <= self.step)
 
     def starts(self, n_states: int) -> Flags:
         """In which states a path can start. Shape (N,)."""

@@ -174,16 +174,14 @@ class Moments:
     def means(self) -> Floats:
         """Weighted means, corrected (2.23) and (3.7); of an unseen state the reference. Shape (N, D)."""
         unseen = self.unseen()
-        result: Floats = self.reference + self.first * (~unseen / np.where(unseen, 1.0, self.weight))[:, None]
-        return result
+        return self.reference + self.first * (~unseen / np.where(unseen, 1.0, self.weight))[:, None]
 
     def scatter(self, means: Floats) -> Floats:
         """Sum of gamma (x - mu)(x - mu)^T about the given means. Shape (N, D, D)."""
         shift = means - self.reference
         cross = self.first[:, :, None] * shift[:, None, :]
         squared = self.weight[:, None, None] * shift[:, :, None] * shift[:, None, :]
-        result: Floats = self.second - cross - np.swapaxes(cross, 1, 2) + squared
-        return result
+        return self.second - cross - np.swapaxes(cross, 1, 2) + squared
 
 
 @dataclass(frozen=True)

@@ -183,5 +183,4 @@ def interpolate(points: Floats, positions: Floats) -> Floats:
     lower = np.clip(np.floor(positions).astype(np.int64), 0, len(points) - 1)
     upper = np.minimum(lower + 1, len(points) - 1)
     fraction = (positions - lower)[:, None]
-    result: Floats = (1.0 - fraction) * points[lower] + fraction * points[upper]
-    return result
+    return (1.0 - fraction) * points[lower] + fraction * points[upper]

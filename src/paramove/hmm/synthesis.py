@@ -16,14 +16,12 @@ LONGEST_PATH = 1_000_000
 def minimum_jerk(progress: Floats, start: float, end: float) -> Floats:
     """0 before start, 1 after end, smooth as a human reach in between (Flash and Hogan 1985)."""
     x = np.clip((progress - start) / (end - start), 0.0, 1.0)
-    result: Floats = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-    return result
+    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
 
 def expected_durations(durations: Floats) -> Floats:
     """Expected number of frames of each state (2.28). Shape (N,)."""
-    result: Floats = durations @ np.arange(1, durations.shape[1] + 1)
-    return result
+    return durations @ np.arange(1, durations.shape[1] + 1)
 
 
 def prototype(means: Floats, lengths: Floats, n_samples: int | None, timing: Timing, path: Path = "linear") -> Floats:
@@ -129,5 +127,4 @@ def at_progress(values: Floats, tau: float | Floats) -> Floats:
     lower = np.floor(position).astype(np.int64)  # Equation (6.5), counted from 0
     upper = np.ceil(position).astype(np.int64)  # Equation (6.6)
     fraction = (position - lower).reshape(position.shape + (1,) * (values.ndim - 1))  # Equation (6.4)
-    result: Floats = (1.0 - fraction) * values[lower] + fraction * values[upper]
-    return result
+    return (1.0 - fraction) * values[lower] + fraction * values[upper]

@@ -63,8 +63,7 @@ class Recognition:
     def half_widths(self) -> Floats:
         """Half widths of the box around the 95 % confidence region of theta. Shape (P,)."""
         size = float(np.sqrt(chdtri(len(self.estimate.theta), 1.0 - REGION)))
-        result: Floats = size * np.sqrt(np.diagonal(self.estimate.covariance))
-        return result
+        return size * np.sqrt(np.diagonal(self.estimate.covariance))
 
     def facts(self) -> dict[str, Any]:
         """Plain values for people and JSON."""

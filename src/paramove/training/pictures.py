@@ -145,8 +145,7 @@ def visibility(model: ParametricHMM, thetas: Floats) -> Floats:
             step[number] = STEP * (width or 1.0)
             slope = (model.state_means(theta + step) - model.state_means(theta - step)) / (2.0 * step[number])
             squares[:, number] += np.einsum("nd,nde,ne->n", slope, inverse, slope) * width**2
-    result: Floats = np.sqrt(squares / len(thetas))
-    return result
+    return np.sqrt(squares / len(thetas))
 
 
 def state_seconds(model: ParametricHMM, theta: Floats) -> tuple[Floats, Floats, str]:

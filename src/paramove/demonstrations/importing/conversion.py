@@ -127,8 +127,7 @@ def _theta(theta: tuple[float, ...], names: tuple[str, ...], matrix: Floats) -> 
 
 def _time(raw: RawTake, options: ImportOptions, file: Path) -> Floats:
     if options.rate_hz is not None:
-        result: Floats = np.arange(len(raw.positions)) / options.rate_hz
-        return result
+        return np.arange(len(raw.positions)) / options.rate_hz
     if raw.time is None:
         raise DemonstrationError(f"{file} has neither times nor a frame rate; give --rate")
     if len(raw.time) and not np.ptp(raw.time) < LONGEST_S:
