@@ -40,6 +40,7 @@ from .movement import at_times as at_times
 from .movement import position_in_theta as position_in_theta
 from .movement_ends import FRAMES as FRAMES
 from .movement_ends import last_parts as last_parts
+from .plots import embedded as embedded
 from .plots import new_figure as new_figure
 from .plots import plot_set as plot_set
 from .plots import space_axes as space_axes

@@ -81,15 +81,20 @@ def space_axes(figure: Figure, cell: Any, paths: Sequence[Floats], title: str) -
     return axes
 
 
+def embedded(figure: Figure, about: str, dpi: float) -> str:
+    """The picture as a part of an HTML page, with a description as its alternative text."""
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=dpi)
+    return image(picture.getvalue(), about)
+
+
 def write_plot(figure: Figure, path: Path, about: str = "") -> None:
     """Writes the picture as PNG, SVG or PDF, or within a self-contained HTML page.
 
     Raises DemonstrationError for another ending.
     """
     if path.suffix.lower() in (".html", ".htm"):
-        picture = io.BytesIO()
-        figure.savefig(picture, format="png", dpi=DPI)
-        plot = image(picture.getvalue(), "paths and coordinates")
+        plot = embedded(figure, "paths and coordinates", DPI)
         style = "main{max-width:1400px}img{max-width:100%}"
         path.write_text(report_page(about, about, "", [plot], style=style), encoding="utf-8")
     elif path.suffix.lower() in (".png", ".svg", ".pdf"):

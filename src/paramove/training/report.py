@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -12,8 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from paramove.demonstrations import new_figure
-from paramove.documents import image, report_page
+from paramove.demonstrations import embedded, new_figure
+from paramove.documents import report_page, section, table
 from paramove.training.drawing import ACTION_COLOURS, INK, WARN, bounds, with_unit
 from paramove.training.leaving_out import LeaveOutResult
 from paramove.training.pictures import plot_model
@@ -98,24 +97,21 @@ def _section(trained: Trained) -> str:
         f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in sentences(trained.facts())
     )
     parts = [f"<section><h2>{escape(trained.action)}</h2><table>{rows}</table></section>"]
-    parts.append(_picture("What the model has learned", "State means over a grid of theta, their scatter, how long "
-                          "states last, and where theta is visible.", plot_model(trained.model)))  # fmt: skip
-    parts.append(_picture("How training went", "Log-likelihood per frame after each iteration.", _curve(trained)))
+    pictures = [
+        ("What the model has learned", "State means over a grid of theta, their scatter, how long states last, and "
+         "where theta is visible.", plot_model(trained.model)),
+        ("How training went", "Log-likelihood per frame after each iteration.", _curve(trained)),
+    ]  # fmt: skip
     if trained.left_out is not None:
-        parts.append(_picture(
+        pictures.append((
             "Movements that were left out", "Left the estimates of theta (dots) and the labels (crosses); right the "
             "error of synthesis of each movement. Red: outside the other thetas, extrapolated.",
             _left_out(trained, trained.left_out),
         ))  # fmt: skip
+    parts += [section(title, why, embedded(figure, title, DPI)) for title, why, figure in pictures]
+    if trained.left_out is not None:
         parts.append(_worst(trained, trained.left_out))
     return "".join(parts)
-
-
-def _picture(title: str, why: str, figure: Figure) -> str:
-    file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=DPI)
-    tag = image(file.getvalue(), title)
-    return f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p>{tag}</section>"
 
 
 def _curve(trained: Trained) -> Figure:
@@ -158,21 +154,18 @@ def _left_out(trained: Trained, result: LeaveOutResult) -> Figure:
 
 
 def _worst(trained: Trained, result: LeaveOutResult) -> str:
-    heads = "".join(f"<th class=n>{escape(with_unit(name))}</th>" for name in result.parameter_names)
-    lines = []
-    for one in sorted(result.movements, key=lambda one: -one.synthesis)[:WORST]:
-        cells = "".join(
-            f"<td class=n>{true:.3f} → {estimated:.3f}</td>"
-            for true, estimated in zip(one.theta, one.estimated, strict=True)
-        )
-        person = escape(trained.examples.subjects[one.number]) or "–"
-        region = "outside" if one.outside else "inside"
-        lines.append(
-            f"<tr><td>{one.number}</td><td>{person}</td>{cells}<td class=n>{100 * one.synthesis:.2f}</td>"
-            f"<td>{region}</td></tr>"
-        )
-    return (
-        "<section><h2>The worst of them</h2><p class=why>Labelled → estimated theta.</p><div class=scroll><table>"
-        f"<tr><th>movement</th><th>person</th>{heads}<th class=n>synthesis, cm</th><th>of the training</th></tr>"
-        f"{''.join(lines)}</table></div></section>"
+    names = [with_unit(name) for name in result.parameter_names]
+    rows = [
+        [
+            str(one.number),
+            escape(trained.examples.subjects[one.number]) or "–",
+            *(f"{true:.3f} → {found:.3f}" for true, found in zip(one.theta, one.estimated, strict=True)),
+            f"{100 * one.synthesis:.2f}",
+            "outside" if one.outside else "inside",
+        ]
+        for one in sorted(result.movements, key=lambda one: -one.synthesis)[:WORST]
+    ]
+    heads = ["movement", "person", *names, "synthesis, cm", "of the training"]
+    return section(
+        "The worst of them", "Labelled → estimated theta.", table(heads, rows, numbers=range(2, len(names) + 3))
     )
