@@ -30,7 +30,7 @@ LeaveOut = Literal["theta", "subject", "none"]
 @app.command()
 def train(
     folder: SetArgument,
-    model: Annotated[Kind, typer.Option(help="how poses depend on theta; best: what is recommended now")] = Kind.best,
+    model: Annotated[Kind, typer.Option(help="how poses depend on theta; best: what is recommended now")] = "best",
     action: Annotated[str | None, typer.Option(help="only this one (default: all, and a classifier)")] = None,
     parameters: Annotated[
         str | None, typer.Option(metavar="NAMES", help="those that are learned (default: all that vary)")
@@ -74,7 +74,7 @@ def train(
         goal = _goal(out, folder, examples)
         make: dict[str, Make] = {
             name: partial(
-                untrained, str(model), description=examples.description(name), n_states=states, d_min=d_min,
+                untrained, model, description=examples.description(name), n_states=states, d_min=d_min,
                 d_max=d_max, frames=frames, residuals=residuals, floor_deviation=examples.floor_deviation,
             )
             for name in examples.actions

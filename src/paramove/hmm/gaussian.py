@@ -4,6 +4,7 @@ Baum-Welch begins with equal parts of each sequence, or with drawn parameters.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Literal, Self, get_args
 
 import numpy as np
@@ -24,7 +25,7 @@ from paramove.hmm.chain import (
 from paramove.hmm.chain_kernels import best_path
 from paramove.hmm.estimation import Covariance, check_kind
 from paramove.hmm.filtering import ChainFilter
-from paramove.hmm.options import Regularisation, TrainingOptions, TrainingSummary
+from paramove.hmm.options import TrainingOptions, TrainingSummary
 from paramove.hmm.sequences import (
     SequenceLengthError,
     Stack,
@@ -196,19 +197,14 @@ class GaussianHMM:
             )
         check_parameters(initial, self.topology)
         stacks = Stack.parts(checked, self.n_states)
-
-        def expect(parameters: ChainParameters) -> ChainStatistics:
-            return ChainStatistics.of(parameters, stacks, self.topology, self.covariance)
-
-        def maximise(
-            old: ChainParameters, statistics: ChainStatistics, regularisation: Regularisation
-        ) -> ChainParameters:
-            return maximised(old, statistics, regularisation, self.topology, self.covariance)
-
-        def penalise(parameters: ChainParameters, regularisation: Regularisation) -> float:
-            return chain_penalty(parameters, regularisation, self.topology)
-
-        parameters, summary = iterate(initial, checked, self.options, expect, maximise, penalise)
+        parameters, summary = iterate(
+            initial,
+            checked,
+            self.options,
+            partial(ChainStatistics.of, stacks=stacks, topology=self.topology, kind=self.covariance),
+            partial(maximised, topology=self.topology, kind=self.covariance),
+            partial(chain_penalty, topology=self.topology),
+        )
         self.with_parameters(parameters)
         self.training_ = summary
         return self

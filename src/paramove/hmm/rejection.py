@@ -3,31 +3,17 @@
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.documents import Floats
+from paramove.hmm.gaussian import GaussianHMM
+from paramove.hmm.left_right import LeftRightHMM
 from paramove.hmm.sequences import SequenceLengthError
 
-
-class Likelihood(Protocol):
-    """Any model with a likelihood of sequences."""
-
-    def log_likelihood(self, sequence: ArrayLike) -> float: ...
-
-
-class Trainable(Likelihood, Protocol):
-    """A model that can be trained anew."""
-
-    def fit(self, sequences: Sequence[ArrayLike]) -> Any: ...
-
-
-class Generative(Likelihood, Protocol):
-    """A model that sequences can be drawn from, to its finish state."""
-
-    def sample(self, rng: np.random.Generator) -> Floats: ...
+Model = GaussianHMM | LeftRightHMM
 
 
 @dataclass(frozen=True)
@@ -46,23 +32,23 @@ class LikelihoodTest:
         values: the K log-likelihoods, in increasing order.
     """
 
-    model: Likelihood
+    model: Model
     values: Floats
 
     @classmethod
-    def of_sequences(cls, model: Likelihood, sequences: Sequence[ArrayLike]) -> Self:
+    def of_sequences(cls, model: Model, sequences: Sequence[ArrayLike]) -> Self:
         """Compare with sequences that the model was not trained on. Raises ValueError if there are none."""
         if len(sequences) == 0:
             raise ValueError("no sequences to compare with: give at least one, 19 for a level of 5 %")
         return cls(model, np.sort([_value(model, sequence) for sequence in sequences]))
 
     @classmethod
-    def of_samples(cls, model: Generative, rng: np.random.Generator, n_sequences: int = 1000) -> Self:
-        """Compare with sequences drawn from the model (method A), as the thesis does."""
+    def of_samples(cls, model: Model, rng: np.random.Generator, n_sequences: int = 1000) -> Self:
+        """Compare with sequences drawn from the model (method A) to its finish state, as the thesis does."""
         return cls.of_sequences(model, [model.sample(rng) for _ in range(n_sequences)])
 
     @classmethod
-    def cross_validated(cls, model: Trainable, sequences: Sequence[ArrayLike], n_parts: int | None = None) -> Self:
+    def cross_validated(cls, model: Model, sequences: Sequence[ArrayLike], n_parts: int | None = None) -> Self:
         """Compare with the training sequences, each judged by a copy of the model trained without it.
 
         Args:
@@ -101,7 +87,7 @@ class LikelihoodTest:
         return self.p_value(sequence) > level
 
 
-def _value(model: Likelihood, sequence: ArrayLike) -> float:
+def _value(model: Model, sequence: ArrayLike) -> float:
     try:
         return model.log_likelihood(sequence)
     except SequenceLengthError:

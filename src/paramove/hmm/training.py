@@ -4,6 +4,7 @@ import logging
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -113,18 +114,16 @@ def train(
 
     Warns (LikelihoodDecreaseWarning) if the objective falls after the annealing.
     """
-    stacks = Stack.parts(sequences, len(initial.means))
+    expect = partial(Statistics.of, stacks=Stack.parts(sequences, len(initial.means)), kind=kind)
+    return iterate(initial, sequences, options, expect, partial(_maximised, kind=kind), penalty)
 
-    def expect(parameters: Parameters) -> Statistics:
-        return Statistics.of(parameters, stacks, kind)
 
-    def maximise(old: Parameters, statistics: Statistics, regularisation: Regularisation) -> Parameters:
-        means = statistics.means()
-        covariances = covariances_of(statistics.scatter(means), statistics.weight, regularisation, kind)
-        durations = durations_of(statistics.durations, old.d_min, regularisation.duration_pseudocount)
-        return Parameters(means, covariances, durations, old.d_min)
-
-    return iterate(initial, sequences, options, expect, maximise, penalty)
+def _maximised(old: Parameters, statistics: Statistics, regularisation: Regularisation, kind: Covariance) -> Parameters:
+    """M-step."""
+    means = statistics.means()
+    covariances = covariances_of(statistics.scatter(means), statistics.weight, regularisation, kind)
+    durations = durations_of(statistics.durations, old.d_min, regularisation.duration_pseudocount)
+    return Parameters(means, covariances, durations, old.d_min)
 
 
 Model = TypeVar("Model")

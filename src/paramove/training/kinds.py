@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from paramove import hmm, phmm
 
@@ -12,24 +11,15 @@ if TYPE_CHECKING:
     from paramove.phmm import MovementDescription, ParametricHMM
 
 
-class Kind(StrEnum):
-    """Names of the models. `best` is the current recommendation: quadratic means with correlated residuals."""
-
-    best = "best"
-    linear = "linear"
-    quadratic = "quadratic"
-    cubic = "cubic"
-    neural = "neural"
-    interpolative = "interpolative"
-
-
+Kind = Literal["best", "linear", "quadratic", "cubic", "neural", "interpolative"]
+"""Names of the models. `best` is the current recommendation: quadratic means with correlated residuals."""
 CLASSES: dict[str, str] = {
-    Kind.best: "QuadraticPHMM",
-    Kind.linear: "LinearPHMM",
-    Kind.quadratic: "QuadraticPHMM",
-    Kind.cubic: "CubicPHMM",
-    Kind.neural: "NeuralPHMM",
-    Kind.interpolative: "InterpolativePHMM",
+    "best": "QuadraticPHMM",
+    "linear": "LinearPHMM",
+    "quadratic": "QuadraticPHMM",
+    "cubic": "CubicPHMM",
+    "neural": "NeuralPHMM",
+    "interpolative": "InterpolativePHMM",
 }
 DEFAULT_STATES = 20
 DEFAULT_FRAMES = 100
