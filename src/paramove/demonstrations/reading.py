@@ -56,9 +56,9 @@ class _Reader:
         inside = gaps_within(left, chosen[0], chosen[-1] + 1)
         if inside:
             message = (
-                f"{segment}: lost for longer than max_gap ({self._max_gap:g} s): {gaps_in_words(inside)}, counted from "
-                "the beginning of the recording. Leave the point out with `points`, shorten the segment, or raise "
-                "max_gap"
+                f"{segment}: lost for longer than max_gap ({self._labels.file.max_gap:g} s): {gaps_in_words(inside)}, "
+                "counted from the beginning of the recording. Leave the point out with `points`, shorten the segment, "
+                "or raise max_gap"
             )
             self.findings.append(self._labels.error(index, message))
             return None
@@ -67,10 +67,6 @@ class _Reader:
             location = f"{self._labels.path.name}:{self._labels.line(index)}"
             self.remarks.append(f"{location}: {segment}: filled {gaps_in_words(inside, 3)}")
         return self._cut(index, segment, chosen, poses)
-
-    @property
-    def _max_gap(self) -> float:
-        return self._labels.file.max_gap
 
     def _read(self, index: int, segment: Segment) -> tuple[PoseRecording, list[PointGap], list[PointGap]] | None:
         """The recording with its short gaps filled, these gaps, and those that are too long."""
@@ -86,7 +82,7 @@ class _Reader:
         except DemonstrationError as error:
             self.findings.append(self._labels.error(index, str(error), "recording"))
             return None
-        positions, filled, left = fill_gaps(poses.time, poses.positions, poses.point_names, self._max_gap)
+        positions, filled, left = fill_gaps(poses.time, poses.positions, poses.point_names, self._labels.file.max_gap)
         return replace(poses, positions=positions), filled, left
 
     def _with_points(self, poses: PoseRecording, name: str) -> PoseRecording:

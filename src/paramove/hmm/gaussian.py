@@ -32,8 +32,8 @@ from paramove.hmm.sequences import (
     check_demonstrations,
     checked_sequence,
     checked_sequences,
-    interpolate,
     not_fitted,
+    resample,
 )
 from paramove.hmm.training import iterate, segment_outputs
 
@@ -53,7 +53,7 @@ def initial_chain(
     "random" draws the cuts of each sequence and all probabilities that the topology leaves open.
     """  # fmt: skip
     # A sequence with fewer frames than states is stretched, for each state needs a frame to begin with.
-    stretched = [_at_least(sequence, n_states) for sequence in sequences]
+    stretched = [one if len(one) >= n_states else resample(one, n_states) for one in sequences]
     mean_length = float(np.mean([len(sequence) for sequence in sequences]))
     starts, exits = topology.starts(n_states).astype(np.float64), topology.exits(n_states).astype(np.float64)
     allowed = topology.transitions(n_states).astype(np.float64)
@@ -71,12 +71,6 @@ def initial_chain(
     total = allowed.sum(axis=1) + exits
     total[total == 0] = 1.0
     return ChainParameters(starts / starts.sum(), allowed / total[:, None], exits / total, means, covariances)
-
-
-def _at_least(sequence: Floats, n_frames: int) -> Floats:
-    if len(sequence) >= n_frames:
-        return sequence
-    return interpolate(sequence, np.linspace(0.0, len(sequence) - 1.0, n_frames))
 
 
 def _drawn_labels(n_frames: int, n_states: int, rng: np.random.Generator) -> Ints:

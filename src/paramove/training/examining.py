@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -192,12 +193,10 @@ def percent(probability: float) -> str:
 
 def confusion(recognitions: Sequence[Recognition]) -> dict[str, dict[str, int]]:
     """Labelled action -> recognised action -> count; "none" where the movement was rejected."""
-    table: dict[str, dict[str, int]] = {}
+    table: dict[str, dict[str, int]] = defaultdict(Counter)
     for one in recognitions:
         if one.movement.action:
-            row = table.setdefault(one.movement.action, {})
-            recognised = one.action if one.known else "none"
-            row[recognised] = row.get(recognised, 0) + 1
+            table[one.movement.action][one.action if one.known else "none"] += 1
     return table
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections import defaultdict
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -127,11 +129,8 @@ def _folds(examples: Examples, by: LeftOutBy) -> list[list[int]]:
     """Numbers of the movements that are left out together; groups share folds where there are many."""
     theta = groups_of(None, examples.theta)
     if by == "repetition":
-        repetitions: dict[int, int] = {}
-        groups = []
-        for cell in theta.tolist():
-            repetitions[cell] = repetitions.get(cell, -1) + 1
-            groups.append(repetitions[cell])
+        repetitions: dict[int, Iterator[int]] = defaultdict(itertools.count)
+        groups = [next(repetitions[cell]) for cell in theta.tolist()]
     else:
         names = examples.subjects if by == "subject" else None
         groups = groups_of(names, examples.theta).tolist()
@@ -156,16 +155,17 @@ def _tested(model: ParametricHMM, examples: Examples, number: int, rest: Example
 def is_outside(theta: Floats, trained: Floats) -> bool:
     """Whether theta (P,) lies outside the convex hull of trained ones (K, P); or their bounds, if many or flat."""
     low, high = trained.min(axis=0), trained.max(axis=0)
-    slack = 1e-6 * np.maximum(high - low, 1e-9)
+    scale = np.maximum(high - low, 1e-9)
+    slack = 1e-6 * scale
     if ((theta < low - slack) | (theta > high + slack)).any():
         return True
     if not 2 <= len(theta) <= HULL_DIMENSIONS:
         return False
     try:
-        hull = Delaunay((trained - low) / np.maximum(high - low, 1e-9))
+        hull = Delaunay((trained - low) / scale)
     except QhullError:
         return False
-    return bool(hull.find_simplex((theta - low) / np.maximum(high - low, 1e-9), tol=1e-6) < 0)
+    return bool(hull.find_simplex((theta - low) / scale, tol=1e-6) < 0)
 
 
 def synthesis_error(model: ParametricHMM, theta: Floats, sequence: Floats, n_points: int) -> float:
