@@ -1,5 +1,7 @@
 """E-step statistics and M-step of Baum-Welch over many sequences (thesis 2.1.6, 2.2.3.2, corrected).
 
+Output covariances are full, diagonal or tied, with prior, shrinkage and floor (thesis 2.2.2).
+
 Corrected (2.21)-(2.24): responsibilities are already normalised per sequence, so no factor 1/p_k.
 Corrected 2.2.3.2: the statistics of tied sub-states are pooled; with explicit durations they are never separate.
 """
