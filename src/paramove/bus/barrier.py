@@ -19,7 +19,7 @@ from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 
 from paramove.bus import topics
 from paramove.bus.bus import Bus
-from paramove.bus.endpoint import can_read, prepare_folder
+from paramove.bus.endpoint import can_read
 from paramove.bus.envelope import Reason, RejectedError, unpack
 from paramove.bus.lockstep import answers_socket, from_marks, member_mark, to_marks
 from paramove.bus.log_format import is_logged
@@ -43,8 +43,7 @@ class LockstepBarrier:
     Without lockstep the clock is only published, and its caller paces it.
 
     Args:
-        bus: A bus that publishes `clock`.
-        members: Names of the nodes to wait for; default `bus.settings.members`.
+        bus: A bus that publishes `clock`; in lockstep it waits for the nodes in `bus.settings.members`.
 
     Attributes:
         members: Nodes that time waits for at present.
@@ -53,13 +52,10 @@ class LockstepBarrier:
         rejected: How many answers were rejected because they did not come from a member.
     """
 
-    def __init__(self, bus: Bus, members: tuple[str, ...] | None = None) -> None:
+    def __init__(self, bus: Bus) -> None:
         self._bus = bus
         self._exchange = bus.exchange
         self._lockstep = bus.settings.lockstep
-        self._expected = (
-            frozenset(bus.settings.members if members is None else members) if self._lockstep else frozenset()
-        )
         self._marks: dict[str, dict[str, tuple[int, int]]] = {}  # by member
         self._pidfds: dict[str, int] = {}
         self._answered: set[str] = set()
@@ -69,7 +65,10 @@ class LockstepBarrier:
         self.rejected = 0
         if self._lockstep:
             bus.hold()
-            self._open()
+            self._socket, ownership, foreign = answers_socket(
+                self._exchange.context, bus.settings.folder, bus.node, MAX_ANSWER_BYTES
+            )
+            self._exchange.add_socket(self._socket, ownership, foreign)
 
     @property
     def members(self) -> frozenset[str]:
@@ -83,8 +82,9 @@ class LockstepBarrier:
         """
         if not self._lockstep:
             return not self._exchange.stopped
-        while not self._exchange.stopped and self._expected - self._newcomers.keys():
-            self._wait(self._expected - self._newcomers.keys(), "join")
+        expected = set(self._bus.settings.members)
+        while not self._exchange.stopped and (missing := expected - self._newcomers.keys()):
+            self._wait(missing, "join")
         self._publish_tick(self._bus.now_ns)
         self._bus.read_up_to(self._all_marks(), keep=True)
         self._bus.release()
@@ -119,15 +119,7 @@ class LockstepBarrier:
             marks |= published
         return marks
 
-    def _open(self) -> None:
-        folder = self._exchange.settings.folder
-        prepare_folder(folder)
-        self._socket, ownership, foreign = answers_socket(
-            self._exchange.context, folder, self._bus.node, MAX_ANSWER_BYTES
-        )
-        self._exchange.add_socket(self._socket, ownership, foreign)
-
-    def _wait(self, missing: set[str] | frozenset[str], what: str) -> None:
+    def _wait(self, missing: set[str], what: str) -> None:
         """Reads answers until there is one or a member ended; logs which members it waits for."""
         warning_due_s = time.monotonic() + WARNING_PERIOD_S
         ready: set[object] = set()

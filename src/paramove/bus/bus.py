@@ -232,7 +232,7 @@ class Bus:
         """
         self.exchange.drain(self._subscribed)
         read_up_to(self.exchange, marks, self._subscribed)
-        return [] if keep else self.exchange.take_up_to(marks, self._subscribed)
+        return [] if keep else self.exchange.take(self._subscribed, marks)
 
     def keep_time(self, now_ns: int) -> None:
         """Sets the time, on the bus that publishes `clock`; raises RuntimeError on others or if time ran backwards."""
@@ -325,8 +325,8 @@ class Bus:
         iteration = self._ticks.next(self._subscribed)
         if iteration is None:
             return False
-        self._backlog += iteration.messages
-        self._tick = iteration.tick
+        messages, self._tick = iteration
+        self._backlog += messages
         if self._held and self._ticks.may_publish:
             self.release()
         return True

@@ -8,6 +8,7 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
+from operator import attrgetter
 from typing import Any
 
 import zmq
@@ -140,22 +141,15 @@ class Exchange:
                     break
                 pending.append((subscriber.counter.epoch or 0, received))
 
-    def take(self, topics: Iterable[str]) -> list[Received]:
-        """Everything drained of these topics, in the order of publish time, then of the topics."""
-        taken: list[Received] = []
-        for name in topics:
-            pending = self._pending[name]
-            taken += [received for _, received in pending]
-            pending.clear()
-        return sorted(taken, key=_published)
+    def take(self, topics: Iterable[str], marks: Marks | None = None) -> list[Received]:
+        """What was drained of these topics, in the order of publish time, then of the topics.
 
-    def take_up_to(self, marks: Marks, topics: Iterable[str]) -> list[Received]:
-        """Like `take`, but leaves what was published after the marks. A topic without a mark is taken whole."""
+        What was published after the marks is left. A topic without a mark is taken whole.
+        """
         taken: list[Received] = []
         for name in topics:
-            pending = self._pending[name]
-            subscriber = self.subscribers[name]
-            mark = marks.get(subscriber.name)
+            pending, subscriber = self._pending[name], self.subscribers[name]
+            mark = marks.get(subscriber.name) if marks else None
             while pending:
                 epoch, received = pending[0]
                 present = epoch == subscriber.counter.epoch
@@ -164,7 +158,7 @@ class Exchange:
                     break
                 taken.append(received)
                 pending.popleft()
-        return sorted(taken, key=_published)
+        return sorted(taken, key=attrgetter("published_ns"))
 
     def missing(self, marks: Marks, topics: Iterable[str]) -> list[str]:
         """Those of the topics that have not been received up to their marks."""
@@ -247,7 +241,3 @@ class Exchange:
         if now_s >= self._second_due_s:
             self._second_due_s = now_s + 1.0
             self.every_second()
-
-
-def _published(received: Received) -> int:
-    return received.published_ns

@@ -17,6 +17,7 @@ from paramove.bus import topics
 from paramove.bus.endpoint import holder_of, is_held, socket_path
 from paramove.bus.subscriber import Received, Subscriber
 from paramove.bus.topics import Topic
+from paramove.bus.visitor import BusVisitor
 
 _POLL_MS = 50
 
@@ -96,25 +97,21 @@ def publisher_of(folder: Path, topic: Topic) -> PublisherOnBus:
 def listen(folder: Path, selected: Sequence[Topic], seconds: float) -> Iterator[Received]:
     """Messages of the topics, decoded, as they arrive within `seconds`."""
     end_s = time.monotonic() + seconds
-    with zmq.Context() as context:
-        subscribers = [Subscriber(context, folder, topic) for topic in selected]
-        try:
-            while time.monotonic() < end_s:
-                for subscriber in subscribers:
-                    while (received := subscriber.receive()) is not None:
-                        yield received
-                _poll(subscribers, end_s)
-        finally:
+    with BusVisitor(folder) as visitor:
+        subscribers = [visitor.subscriber(topic) for topic in selected]
+        while time.monotonic() < end_s:
             for subscriber in subscribers:
-                subscriber.close()
+                while (received := subscriber.receive()) is not None:
+                    yield received
+            _poll(subscribers, end_s)
 
 
 def measure(folder: Path, selected: Sequence[Topic], seconds: float) -> list[Measurement]:
     """Counts what is published on the topics for `seconds`, reading envelopes only: payloads are not decoded."""
     end_s = time.monotonic() + seconds
     measurements = [Measurement(topic) for topic in selected]
-    with zmq.Context() as context:
-        subscribers = [Subscriber(context, folder, topic) for topic in selected]
+    with BusVisitor(folder) as visitor:
+        subscribers = [visitor.subscriber(topic) for topic in selected]
         while time.monotonic() < end_s:
             for subscriber, measurement in zip(subscribers, measurements, strict=True):
                 while (raw := subscriber.receive_raw()) is not None:
@@ -127,7 +124,6 @@ def measure(folder: Path, selected: Sequence[Topic], seconds: float) -> list[Mea
             measurement.messages, measurement.lost = counter.messages, counter.lost
             measurement.sequence, measurement.epoch = counter.sequence, counter.epoch or 0
             measurement.rejected = counter.rejected.total()
-            subscriber.close()
     return measurements
 
 

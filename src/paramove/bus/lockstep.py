@@ -28,7 +28,7 @@ from paramove.bus.envelope import Envelope, pack, publisher_id
 from paramove.bus.exchange import Exchange, Marks
 from paramove.bus.monitor import ForeignConnections
 from paramove.bus.schemas import schema_hash
-from paramove.bus.ticks import LONGEST_WAIT_S, LoopTick, Tick
+from paramove.bus.ticks import LONGEST_WAIT_S, Iteration, Tick
 from paramove.msgs.clock_pb2 import Clock, TickDone, TopicMark
 
 _log = logging.getLogger(__name__)
@@ -132,7 +132,7 @@ class LockstepTicks:
         self._shaken = False
         self._tick: int | None = None
 
-    def next(self, names: list[str]) -> LoopTick | None:
+    def next(self, names: list[str]) -> Iteration | None:
         if self._tick is not None:
             self._answer(TickDone.KIND_DONE, self._tick)
             self._tick = None
@@ -154,7 +154,7 @@ class LockstepTicks:
                 continue
             self.may_publish = True
             self._tick = clock.tick
-            return LoopTick(self._exchange.take_up_to(marks, names), Tick(clock.tick, clock.time_ns))
+            return self._exchange.take(names, marks), Tick(clock.tick, clock.time_ns)
         return None
 
     def leave(self) -> None:

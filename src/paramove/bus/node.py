@@ -29,7 +29,7 @@ from paramove.bus.endpoint import BusFolderError, TopicTakenError
 from paramove.bus.log_format import log_to_stderr
 from paramove.bus.settings import BusSettings
 from paramove.bus.topics import Topic
-from paramove.documents import InputError, OldNames, exit_codes, read_document
+from paramove.documents import InputError, OldNames, exit_codes, findings, read_document
 
 _log = logging.getLogger(__name__)
 
@@ -62,15 +62,15 @@ class ConfigurationError(InputError):
 
 
 def read_node_file(path: Path, config_type: type[Config]) -> tuple[NodeFile, Config]:
-    """Reads and checks the file behind `--config`; raises ConfigurationError with every wrong key named."""
+    """Reads and checks the file behind `--config`; raises ConfigurationError that names the wrong keys."""
     try:
         file = NodeFile.model_validate(read_document(path, "configuration of a node", ConfigurationError).data)
     except ValidationError as error:
-        raise ConfigurationError(_message(path, error)) from error
+        raise ConfigurationError(f"{path}: {findings(error)}") from error
     try:
         return file, config_type.model_validate(file.parameters)
     except ValidationError as error:
-        raise ConfigurationError(_message(path, error, "parameters.")) from error
+        raise ConfigurationError(f"{path}: parameters: {findings(error)}") from error
 
 
 def publish_each(bus: Bus, published: Sequence[Topic], messages: Sequence[Iterable[Any]]) -> None:
@@ -139,12 +139,3 @@ def _run(run: Callable[[Bus, Config], None], bus: Bus, config: Config) -> int:
     if not bus.has_ended:
         bus.ended("stopped on request" if bus.stopped else "finished")
     return exit_codes.OK
-
-
-def _message(path: Path, error: ValidationError, prefix: str = "") -> str:
-    """One line per wrong key: location, reason and the value found."""
-    lines = [
-        f"{path}: {prefix}{'.'.join(map(str, item['loc']))}: {item['msg']} (found {item['input']!r:.80})"
-        for item in error.errors()
-    ]
-    return "\n".join(lines)

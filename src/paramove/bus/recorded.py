@@ -55,7 +55,7 @@ class RecordedBus:
         recorded: Messages and ticks, in the order in which the node gets them.
         node: Name of the node.
         run_folder: Where the node may write files.
-        protected: Reject messages with unsound numbers, as the bus does; they are listed in `refused`.
+        protected: Reject messages with unsound numbers, as the bus does; they are listed in `rejected`.
 
     Attributes:
         published: Everything the node published, in order.

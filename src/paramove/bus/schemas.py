@@ -10,6 +10,7 @@ release in `tests/data/releases`; an incompatible change raises the type's gener
 from __future__ import annotations
 
 import hashlib
+from functools import cache
 from typing import Any
 
 from paramove.bus import topics
@@ -20,16 +21,12 @@ GENERATIONS: dict[str, int] = {}
 Counts for the type that stands in the topic table, also if the change was in a type within it.
 """
 
-_KNOWN: dict[Any, int] = {}
 
-
+@cache
 def schema_hash(message_type: type[Any]) -> int:
     """First 64 bits (little-endian) of SHA-256 over "<full name> <generation>"."""
-    known = _KNOWN.get(message_type)
-    if known is None:
-        name = str(message_type.DESCRIPTOR.full_name)
-        known = _KNOWN[message_type] = hash_of(name, GENERATIONS.get(name, 1))
-    return known
+    name = str(message_type.DESCRIPTOR.full_name)
+    return hash_of(name, GENERATIONS.get(name, 1))
 
 
 def hash_of(name: str, generation: int) -> int:

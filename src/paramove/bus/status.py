@@ -21,6 +21,7 @@ class StatusReporter:
     """Publishes `status/<node>`.
 
     Attributes:
+        state: Latest state published.
         processing_ns: Time the node has spent on messages and ticks, on the wall clock.
         processed: How many it has handled.
     """
@@ -29,15 +30,10 @@ class StatusReporter:
         self._exchange = exchange
         self._publisher = exchange.advertise(status(node))
         self._node = node
-        self._state: NodeStatus.State = NodeStatus.STATE_STARTING
+        self.state: NodeStatus.State = NodeStatus.STATE_STARTING
         self._message = ""
         self.processing_ns = 0
         self.processed = 0
-
-    @property
-    def state(self) -> NodeStatus.State:
-        """Latest state published."""
-        return self._state
 
     @property
     def has_subscriber(self) -> bool:
@@ -47,9 +43,9 @@ class StatusReporter:
     def change(self, state: NodeStatus.State, message: str, now_ns: int) -> None:
         """Publishes a state and its message at once, if they are new."""
         message = message[:MAX_MESSAGE_LENGTH]
-        if (state, message) == (self._state, self._message) and self._publisher.sequence:
+        if (state, message) == (self.state, self._message) and self._publisher.sequence:
             return
-        self._state, self._message = state, message
+        self.state, self._message = state, message
         _log.info("%s: %s", NodeStatus.State.Name(state).removeprefix("STATE_").lower(), message)
         self.publish(now_ns)
 
@@ -57,7 +53,7 @@ class StatusReporter:
         """Publishes the present state and counts."""
         status_message = NodeStatus(
             node=self._node,
-            state=self._state,
+            state=self.state,
             detail=self._message,
             pid=os.getpid(),
             processing_seconds=self.processing_ns * 1e-9,

@@ -69,7 +69,6 @@ class Subscriber:
         self.name = name or topic.name
         self.counter = SequenceCounter()
         self.connected = False
-        self.reopened = 0
         self._context = context
         self._path = socket_path(folder, self.name)
         self._budget = RateBudget(topic.budget_hz)
@@ -167,7 +166,6 @@ class Subscriber:
         self.close()
         self.connected = False
         self._open()
-        self.reopened += 1
 
     def close(self) -> None:
         """Closes the socket; messages not yet received are gone."""

@@ -36,12 +36,8 @@ class Tick:
     now_ns: int
 
 
-@dataclass
-class LoopTick:
-    """Messages, and the tick after them if there is one."""
-
-    messages: list[Received]
-    tick: Tick | None = None
+Iteration = tuple[list[Received], Tick | None]
+"""Messages, and the tick after them if there is one."""
 
 
 class TickSource(Protocol):
@@ -55,7 +51,7 @@ class TickSource(Protocol):
     def may_publish(self) -> bool:
         """Whether messages go out at once; otherwise the bus queues them until the next iteration."""
 
-    def next(self, names: list[str]) -> LoopTick | None:
+    def next(self, names: list[str]) -> Iteration | None:
         """Waits for the next iteration with these topics; None once the bus was stopped. Ends the iteration before."""
 
 
@@ -74,7 +70,7 @@ class RealTimeTicks:
         """Nanoseconds of the machine's monotonic clock."""
         return time.monotonic_ns()
 
-    def next(self, names: list[str]) -> LoopTick | None:
+    def next(self, names: list[str]) -> Iteration | None:
         exchange = self._exchange
         while not exchange.stopped:
             exchange.drain(names)
@@ -83,9 +79,9 @@ class RealTimeTicks:
             number = (now_ns - self._start_ns) // TICK_PERIOD_NS
             if number > self._number:  # missed ticks are skipped
                 self._number = number
-                return LoopTick(messages, Tick(number, now_ns))
+                return messages, Tick(number, now_ns)
             if messages:
-                return LoopTick(messages)
+                return messages, None
             due_ns = self._start_ns + (self._number + 1) * TICK_PERIOD_NS
             exchange.wait(max(0.0, (due_ns - now_ns) * 1e-9))
         return None
@@ -101,7 +97,7 @@ class SimulatedTicks:
         self.now_ns = 0
         exchange.subscribe(topics.CLOCK)
 
-    def next(self, names: list[str]) -> LoopTick | None:
+    def next(self, names: list[str]) -> Iteration | None:
         exchange = self._exchange
         while not exchange.stopped:
             exchange.drain([topics.CLOCK.name])  # first: what was published before a tick has then arrived, too
@@ -112,7 +108,7 @@ class SimulatedTicks:
                 self.now_ns = clock.message.time_ns
                 tick = Tick(clock.message.tick, self.now_ns)
             if messages or tick:
-                return LoopTick(messages, tick)
+                return messages, tick
             exchange.wait(LONGEST_WAIT_S)
         return None
 
@@ -124,5 +120,5 @@ class ExternalClock:
         self.now_ns = begun_ns
         self.may_publish = True
 
-    def next(self, names: list[str]) -> LoopTick | None:
+    def next(self, names: list[str]) -> Iteration | None:
         raise RuntimeError("the publisher of the clock receives with LockstepBarrier.advance, not with bus.events")

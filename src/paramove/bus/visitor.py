@@ -5,8 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import zmq
 
@@ -15,7 +14,7 @@ from paramove.bus.subscriber import Subscriber
 from paramove.bus.topics import Topic
 
 
-class BusVisitor:
+class BusVisitor(contextlib.ExitStack):
     """Sockets on a run's bus, while it is a context.
 
     Args:
@@ -23,32 +22,23 @@ class BusVisitor:
         name: Name under which it publishes.
     """
 
-    def __init__(self, folder: Path, name: str) -> None:
+    def __init__(self, folder: Path, name: str = "") -> None:
+        super().__init__()
         self._folder, self._name = folder, name
-        self._opened = contextlib.ExitStack()
-        self._owned = self._opened.enter_context(contextlib.ExitStack())  # released after the context has ended
-        self._context: zmq.Context[Any] = self._opened.enter_context(zmq.Context())
-        self._sockets = self._opened.enter_context(contextlib.ExitStack())
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
-    ) -> None:
-        self._opened.close()
+        self._owned = self.enter_context(contextlib.ExitStack())  # released after the ZeroMQ context has ended
+        self._context: zmq.Context[Any] = self.enter_context(zmq.Context())
 
     def publisher(self, topic: Topic) -> Publisher:
         """The one publisher of a topic. Raises TopicTakenError and BusFolderError."""
         publisher = Publisher(self._context, self._folder, topic, self._name)
         self._owned.callback(publisher.ownership.release)
-        self._sockets.callback(publisher.close)
+        self.callback(publisher.close)
         return publisher
 
     def subscriber(self, topic: Topic) -> Subscriber:
         """A subscriber to a topic."""
         subscriber = Subscriber(self._context, self._folder, topic)
-        self._sockets.callback(subscriber.close)
+        self.callback(subscriber.close)
         return subscriber
 
 
