@@ -7,6 +7,7 @@ depends on how fast the processes were stopped, and so on the wall clock.
 from __future__ import annotations
 
 import json
+from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -147,6 +148,12 @@ class RecordedRun:
     def received(self, topic: topics.Topic) -> list[Recorded]:
         """Messages of a topic, in order."""
         return self.messages.get(topic.name, [])
+
+    def latest(self, topic: topics.Topic, time_s: float, stamp: str = "publish_ns") -> Recorded | None:
+        """The latest message of a topic whose stamp (or its `log_ns`) is not after a time, s; None before the first."""
+        messages = self.received(topic)
+        index = bisect_right(messages, time_s, key=lambda recorded: 1e-9 * getattr(recorded, stamp))
+        return messages[index - 1] if index else None
 
 
 def load_run(folder: Path) -> RecordedRun:

@@ -15,10 +15,8 @@ from paramove.diagnosis import Eye, GraphicsError
 from paramove.documents import Floats, replacing
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.robots import RobotDescription
-from paramove.runs.rule_learning.video_frame import SIZE, TEXT, label, paste
-from paramove.runs.video_writer import VideoWriter
+from paramove.runs.video import FRAMES_PER_S, SIZE, TEXT, VideoWriter, label, paste
 
-FRAMES_PER_S = 30.0
 FRONT = (0.704, 0.534, 0.283, 0.373)
 """Quaternion (w, x, y, z) of a camera before the table on the right that looks at its middle."""
 
@@ -40,7 +38,7 @@ def write_film(folder: Path, robot: RobotDescription, states: Sequence[TruthStat
     except GraphicsError as error:
         console.print(f"no film: {error}", markup=False, soft_wrap=True)
         return None
-    with closing(eye), replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
+    with closing(eye), replacing(path) as unfinished, VideoWriter(unfinished) as writer:
         for time_s in track(shown_s, "video", console=console, transient=True):
             data.qpos[:] = [np.interp(time_s, times_s, column) for column in rows.T]
             mujoco.mj_forward(model, data)

@@ -20,10 +20,8 @@ from paramove.cameras import CalibratedCamera, decode, read_cameras
 from paramove.documents import Image, replacing
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.runs.recorded_run import recording_in
-from paramove.runs.video_writer import VideoWriter
+from paramove.runs.video import SIZE, VideoWriter
 
-SIZE = (1280, 720)
-RATE_HZ = 30.0
 REPEATED = 2
 """Images come at 15 Hz."""
 BALL_PX = 9.0
@@ -42,12 +40,11 @@ def write_pointing_video(folder: Path, console: Console) -> Path | None:
     scale = min(SIZE[0] / width, SIZE[1] / height)
     inner = (round(scale * width), round(scale * height))
     left, top = (SIZE[0] - inner[0]) // 2, (SIZE[1] - inner[1]) // 2
-    with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, RATE_HZ) as writer:
+    with replacing(path) as unfinished, VideoWriter(unfinished) as writer:
         for image, outline, caption in track(frames, "video", console=console, transient=True):
             picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
             picture[top : top + inner[1], left : left + inner[0]] = drawn(decode(image), outline, caption, inner)
-            for _ in range(REPEATED):
-                writer.write(picture)
+            writer.write(picture, REPEATED)
     return path
 
 

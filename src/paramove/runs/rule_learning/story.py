@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,6 @@ from paramove.bus import topics
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage
 from paramove.objects import PlaneHomography
-from paramove.recording import Recorded
 from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.relocations import Relocation
 
@@ -64,59 +63,23 @@ class RobotState:
         return f"{self.gesture.object or 'hand'} {_TEXTS[self.gesture.kind]}"
 
 
-class Story:
-    """Looks up the latest of everything.
-
-    Args:
-        run: The run.
-        relocations: Its goals.
-    """
-
-    def __init__(self, run: RecordedRun, relocations: list[Relocation]) -> None:
-        self._latest = {
-            topic: _Latest(run.received(topic))
-            for topic in (
-                topics.APPLICATION_STAGE,
-                topics.SPEECH,
-                topics.RULES,
-                topics.GESTURES,
-                topics.RELOCATION_STATUS,
-                topics.CALIBRATION_PLANE,
-            )
-        }
-        # What is drawn onto an image belongs to the time at which the image was taken.
-        tracked = run.received(topics.OBJECTS_TRACKED)
-        self._latest[topics.OBJECTS_TRACKED] = _Latest(tracked, [recorded.log_ns for recorded in tracked])
-        self._relocations = relocations
-
-    def at(self, time_s: float) -> RobotState:
-        """The robot's state at a time, s."""
-        latest = {topic: messages.at(time_s) for topic, messages in self._latest.items()}
-        stage, speech, rules = (latest[topic] for topic in (topics.APPLICATION_STAGE, topics.SPEECH, topics.RULES))
-        gesture, tracked, status = (
-            latest[topic] for topic in (topics.GESTURES, topics.OBJECTS_TRACKED, topics.RELOCATION_STATUS)
-        )
-        plane = latest[topics.CALIBRATION_PLANE]
-        goal = next((g for g in self._relocations if g.begun_s <= time_s < g.ended_s and g.result != "refused"), None)
-        of_goal = goal is not None and status is not None and status.message.goal_id == goal.goal.id
-        fresh = gesture is not None and time_s - gesture.publish_ns * 1e-9 < GESTURE_DISPLAYED_S
-        return RobotState(
-            stage=ApplicationStage.Stage.Name(stage.message.stage).removeprefix("STAGE_").lower() if stage else "",
-            detail=speech.message.text if speech is not None else "",
-            rules={rule.object: (rule.x, rule.y) for rule in rules.message.rules} if rules is not None else {},
-            goal=goal,
-            phase=status.message.phase if of_goal and status is not None else "",
-            gesture=gesture.message if fresh and gesture is not None else None,
-            tracked=tracked.message if tracked is not None else None,
-            homography=PlaneHomography.from_message(plane.message) if plane is not None else None,
-        )
-
-
-class _Latest:
-    def __init__(self, messages: list[Recorded], times_ns: list[int] | None = None) -> None:
-        self._messages = messages
-        self._times = [1e-9 * t for t in times_ns or [recorded.publish_ns for recorded in messages]]
-
-    def at(self, time_s: float) -> Recorded | None:
-        index = bisect_right(self._times, time_s) - 1
-        return self._messages[index] if index >= 0 else None
+def state_at(run: RecordedRun, relocations: Sequence[Relocation], time_s: float) -> RobotState:
+    """The robot's state at a time of a run, s, by the latest of everything; `relocations` are the run's goals."""
+    stage, speech = run.latest(topics.APPLICATION_STAGE, time_s), run.latest(topics.SPEECH, time_s)
+    rules, plane = run.latest(topics.RULES, time_s), run.latest(topics.CALIBRATION_PLANE, time_s)
+    gesture, status = run.latest(topics.GESTURES, time_s), run.latest(topics.RELOCATION_STATUS, time_s)
+    # What is drawn onto an image belongs to the time at which the image was taken.
+    tracked = run.latest(topics.OBJECTS_TRACKED, time_s, "log_ns")
+    goal = next((g for g in relocations if g.begun_s <= time_s < g.ended_s and g.result != "refused"), None)
+    of_goal = goal is not None and status is not None and status.message.goal_id == goal.goal.id
+    fresh = gesture is not None and time_s - gesture.publish_ns * 1e-9 < GESTURE_DISPLAYED_S
+    return RobotState(
+        stage=ApplicationStage.Stage.Name(stage.message.stage).removeprefix("STAGE_").lower() if stage else "",
+        detail=speech.message.text if speech is not None else "",
+        rules={rule.object: (rule.x, rule.y) for rule in rules.message.rules} if rules is not None else {},
+        goal=goal,
+        phase=status.message.phase if of_goal and status is not None else "",
+        gesture=gesture.message if fresh and gesture is not None else None,
+        tracked=tracked.message if tracked is not None else None,
+        homography=PlaneHomography.from_message(plane.message) if plane is not None else None,
+    )

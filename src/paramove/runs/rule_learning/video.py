@@ -1,9 +1,11 @@
-"""The demo video of a run."""
+"""The demo video of a run: the camera with the robot's estimates, the world next to it, captions around."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from itertools import islice
+from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,18 +13,35 @@ from rich.console import Console
 from rich.progress import track
 
 from paramove.bus import topics
-from paramove.documents import Image, InputError, decoded, replacing
-from paramove.runs.recorded_run import RecordedRun
-from paramove.runs.rule_learning.story import Story
+from paramove.cameras import decode
+from paramove.documents import Image, replacing
+from paramove.msgs.tracked_objects_pb2 import TrackedObject
+from paramove.runs.rule_learning.story import RobotState, state_at
 from paramove.runs.rule_learning.summary import RunEvaluation
-from paramove.runs.rule_learning.video_frame import SIZE, VideoFrame
-from paramove.runs.video_writer import VideoError, VideoWriter
+from paramove.runs.video import (
+    ACCENT,
+    FAINT,
+    FRAMES_PER_S,
+    LINGER_FRAMES,
+    PANEL,
+    SIZE,
+    TEXT,
+    TOP_PX,
+    Colour,
+    VideoWriter,
+    label,
+    paste,
+    shortened,
+    side_by_side,
+    views_with,
+)
 
-FRAMES_PER_S = 30.0
+COLOURS: dict[str, Colour] = {"yellow": (255, 205, 40), "green": (70, 205, 95), "blue": (95, 140, 255)}
+HAND: Colour = (255, 80, 190)
+STAGES = ("calibrate", "learn", "apply")
 CAMERA_HZ = 15.0
 LONG_RUN_S = 400.0
 """A longer run is displayed four times as fast as it was, others twice."""
-LINGER_FRAMES = 60  # the last picture stays so long
 
 
 def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
@@ -32,49 +51,134 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
         VideoError: There is no encoder.
     """
     run = evaluation.run
-    number = sum(time_s <= run.end_s for time_s in view_times(run))
+    views = run.recording("truth").read({topics.TRUTH_VIEW.name})
+    number = sum(view.log_ns * 1e-9 <= run.end_s for view in views)
     if number == 0:
         return None
-    story = Story(run, evaluation.relocations)
     factor = 2 if run.end_s <= LONG_RUN_S else 4
     every = round(factor * CAMERA_HZ / FRAMES_PER_S)
-    frame = VideoFrame(run.title("rule learning"), factor)
+    title, steady = run.title("rule learning"), SteadyImage()
     path = run.folder / "demo.mp4"
-    with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
-        indices = range(0, number, every)
-        pictures = paired_images(run, every)
+    with replacing(path) as unfinished, VideoWriter(unfinished) as writer:
+        pairs = views_with(run, {topics.CAMERA_IMAGE.name}, attrgetter("log_ns"))
+        displayed = ((view, *latest.values()) for view, latest in islice(pairs, 0, None, every) if latest)
+        count = len(range(0, number, every))
         picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
-        for _, (time_s, camera, view) in zip(
-            track(indices, "video", console=console, transient=True), pictures, strict=False
-        ):
-            picture = frame.draw(camera, view, story.at(time_s), time_s, run.end_s)
+        for view, image in track(islice(displayed, count), "video", count, console=console, transient=True):
+            time_s = view.log_ns * 1e-9
+            camera = steady.update(_rgb(image.message))
+            state = state_at(run, evaluation.relocations, time_s)
+            picture = drawn(camera, _rgb(view.message), state, title, time_s, factor)
+            done = round(SIZE[0] * min(1.0, time_s / run.end_s)) if run.end_s > 0 else 0
+            picture[-4:, :done] = ACCENT
             writer.write(picture)
-        for _ in range(LINGER_FRAMES):
-            writer.write(picture)
+        writer.write(picture, LINGER_FRAMES)
     return path
 
 
-def view_times(run: RecordedRun) -> Iterator[float]:
-    """Times of the recorded views, s."""
-    for recorded in run.recording("truth").read({topics.TRUTH_VIEW.name}):
-        yield recorded.log_ns * 1e-9
+def _rgb(message: Any) -> Image:
+    return np.asarray(cv2.cvtColor(decode(message), cv2.COLOR_BGR2RGB), dtype=np.uint8)
 
 
-def paired_images(run: RecordedRun, every: int) -> Iterator[tuple[float, Image, Image]]:
-    """Time, camera image and view, RGB, of every so-many-th view; the camera's image is the latest one by then."""
-    cameras = run.recording("recording").read({topics.CAMERA_IMAGE.name})
-    latest, following = None, next(cameras, None)
-    views = run.recording("truth").read({topics.TRUTH_VIEW.name})
-    for index, view in enumerate(views):
-        while following is not None and following.log_ns <= view.log_ns:
-            latest, following = following, next(cameras, None)
-        if index % every == 0 and latest is not None:
-            yield view.log_ns * 1e-9, _decoded(latest.message.data), _decoded(view.message.data)
+def drawn(camera: Image, view: Image, state: RobotState, title: str, time_s: float, factor: float) -> Image:
+    """A picture from the two images, RGB, and the robot's state."""
+    zoom = PANEL[0] / camera.shape[1]
+    view_of_robot = np.asarray(cv2.resize(camera, PANEL, interpolation=cv2.INTER_CUBIC))
+    draw_estimates(view_of_robot, state, zoom)
+    picture = side_by_side(view_of_robot, "camera: what the robot sees", view, title, time_s, factor)
+    _stages(picture[:TOP_PX], state)
+    _captions(picture[TOP_PX + PANEL[1] :], state)
+    return picture
 
 
-def _decoded(data: bytes) -> Image:
-    try:
-        image = decoded(data)
-    except InputError as error:
-        raise VideoError(f"an image of {len(data)} bytes in the recording {error}") from error
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+def _stages(bar: Image, state: RobotState) -> None:
+    reached = len(STAGES) if state.stage == "done" else STAGES.index(state.stage) if state.stage in STAGES else -1
+    x = 534
+    for index, stage in enumerate(STAGES):
+        now = index == reached
+        colour = ACCENT if now else TEXT if index < reached else FAINT
+        text = f"{'✓' if index < reached else index + 1} {stage}"
+        sprite = label(text, 20, colour, bold=now)
+        paste(bar, sprite, x, 12)
+        x += sprite.shape[1] + 35
+
+
+class SteadyImage:
+    """Holds what does not change, so that the sensor's noise does not fill the video file."""
+
+    CHANGE = 9  # of 255, in any colour, after smoothing
+
+    def __init__(self) -> None:
+        self._held: Image | None = None
+        self._seed = np.ones((3, 3), dtype=np.uint8)
+        self._around = np.ones((9, 9), dtype=np.uint8)
+
+    def update(self, image: Image) -> Image:
+        """The image with new content only where it differs from what is held."""
+        smooth = np.asarray(cv2.GaussianBlur(image, (5, 5), 0), dtype=np.uint8)
+        if self._held is None:
+            self._held = smooth
+        red, green, blue = cv2.split(cv2.absdiff(smooth, self._held))
+        _, changed = cv2.threshold(cv2.max(cv2.max(red, green), blue), self.CHANGE, 255, cv2.THRESH_BINARY)
+        changed = cv2.dilate(cv2.morphologyEx(changed, cv2.MORPH_OPEN, self._seed), self._around)
+        cv2.copyTo(smooth, changed, self._held)
+        return self._held.copy()
+
+
+def draw_estimates(image: Image, state: RobotState, zoom: float) -> None:
+    """Tracked objects, hand, goal and estimated openings, drawn into the camera's image, enlarged by `zoom`."""
+    if state.homography is not None:
+        for name, opening in state.rules.items():
+            at = _pixel(state.homography, opening, zoom)
+            cv2.circle(image, at, 17, COLOURS.get(name, TEXT), 2, cv2.LINE_AA)
+            cv2.drawMarker(image, at, COLOURS.get(name, TEXT), cv2.MARKER_CROSS, 11, 2, cv2.LINE_AA)
+        if state.goal is not None and state.goal.fetches:
+            start = _pixel(state.homography, tuple(state.goal.source[:2]), zoom)
+            end = _pixel(state.homography, tuple(state.goal.target[:2]), zoom)
+            cv2.arrowedLine(image, start, end, ACCENT, 3, cv2.LINE_AA, tipLength=0.08)
+    for item in state.tracked.objects if state.tracked is not None else ():
+        if item.kind == TrackedObject.KIND_HAND:
+            _draw_hand(image, item, zoom)
+        else:
+            _draw_object(image, item, state, zoom)
+
+
+def _draw_hand(image: Image, item: Any, zoom: float) -> None:
+    corners = (zoom * np.array([(p.u_px, p.v_px) for p in item.outline])).round().astype(np.int32).reshape(-1, 1, 2)
+    if len(corners):
+        cv2.polylines(image, [corners], True, HAND, 2, cv2.LINE_AA)
+    cv2.circle(image, (round(zoom * item.u_px), round(zoom * item.v_px)), 4, HAND, -1, cv2.LINE_AA)
+
+
+def _draw_object(image: Image, item: Any, state: RobotState, zoom: float) -> None:
+    colour = COLOURS.get(item.name, TEXT)
+    left, top = round(zoom * item.left_px) - 3, round(zoom * item.top_px) - 3
+    right, bottom = left + round(zoom * item.width_px) + 6, top + round(zoom * item.height_px) + 6
+    cv2.rectangle(image, (left, top), (right, bottom), colour, 2, cv2.LINE_AA)
+    gesture = state.gesture
+    fresh = gesture is not None and gesture.object == item.name
+    text = state.seeing if fresh else item.name
+    sprite = label(text, 16, colour, bold=fresh)
+    paste(image, sprite, left, max(0, top - sprite.shape[0] - 2), shade=True)
+
+
+def _captions(panel: Image, state: RobotState) -> None:
+    if state.detail:
+        paste(panel, label(shortened(state.detail, 96), 23, TEXT, bold=True), 18, 24)
+    paste(panel, label("estimates", 17, FAINT), 18, 81)
+    x = 118
+    for name, (u, v) in state.rules.items():
+        sprite = label(f"{name} → ({u * 100:.1f}, {v * 100:.1f}) cm".replace("-", "−"), 19, COLOURS.get(name, TEXT))
+        paste(panel, sprite, x, 79)
+        x += sprite.shape[1] + 35
+    if not state.rules:
+        paste(panel, label("nothing yet", 19, FAINT), x, 79)
+    paste(panel, label("does", 17, FAINT), 18, 132)
+    paste(panel, label(state.doing or "waits", 19, ACCENT if state.doing else FAINT), 118, 130)
+    paste(panel, label("detects", 17, FAINT), 658, 132)
+    paste(panel, label(state.seeing or "–", 19, TEXT if state.seeing else FAINT), 746, 130)
+
+
+def _pixel(homography: Any, position: tuple[float, float], zoom: float) -> tuple[int, int]:
+    u, v = homography.image_from_plane(*position)
+    return round(float(np.clip(zoom * u, -999, 9999))), round(float(np.clip(zoom * v, -999, 9999)))
