@@ -191,7 +191,7 @@ class SyntheticRun:
     def _calibration(self):
         """The exact homography of a camera without distortion, moved by `calibration_off`."""
         from paramove.objects.homography import PlaneHomography
-        from paramove.runs.rule_learning.homography_accuracy import project
+        from paramove.runs.rule_learning.accuracy import project
 
         plane = np.array([(0.135, -0.1), (0.135, 0.076), (0.19, 0.076), (0.19, -0.1)])
         height = np.full((4, 1), MIDDLE_Z)

@@ -11,5 +11,5 @@ from .batch_table import totals_of as totals_of
 from .plots import STYLE as STYLE
 from .recorded_run import RunFolderError as RunFolderError
 from .recorded_run import load_run as load_run
-from .rule_learning.homography_accuracy import GOAL_MM as GOAL_MM
-from .rule_learning.homography_accuracy import accuracy_of as accuracy_of
+from .rule_learning.accuracy import GOAL_MM as GOAL_MM
+from .rule_learning.accuracy import accuracy_of as accuracy_of

@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, Rectangle
 
 from paramove.bus import topics
 from paramove.runs.relocations import stages_of
-from paramove.runs.rule_learning.homography_accuracy import GOAL_MM, GRID_STEPS, GRID_X, GRID_Y
+from paramove.runs.rule_learning.accuracy import GOAL_MM, GRID_STEPS, GRID_X, GRID_Y
 from paramove.runs.rule_learning.summary import RunEvaluation
 
 COLOURS = {"yellow": "#d9a400", "green": "#2f9e57", "blue": "#3367d6"}

@@ -80,17 +80,14 @@ class Motion:
         goal_id: Of the goal that it belongs to.
         begun_s: When its time was 0, in the run's time.
         reached_s: How far it got, along the trajectory.
-        times: [K], s.
-        angles: [K, J], rad; `joints` their names.
+        duration_s: Of the whole trajectory.
         phases: Name -> start, s.
     """
 
     goal_id: str
     begun_s: float
     reached_s: float
-    times: Floats
-    angles: Floats
-    joints: tuple[str, ...]
+    duration_s: float
     phases: dict[str, float]
 
     def middle_of(self, phase: str) -> float | None:
@@ -98,7 +95,7 @@ class Motion:
         if phase not in self.phases:
             return None
         start = self.phases[phase]
-        end = min((other for other in self.phases.values() if other > start), default=float(self.times[-1]))
+        end = min((other for other in self.phases.values() if other > start), default=self.duration_s)
         middle = (start + end) / 2
         return middle if middle <= self.reached_s else None
 
@@ -176,9 +173,7 @@ def motions_of(run: RecordedRun) -> list[Motion]:
             goal_id=message.id.rpartition("/")[0],
             begun_s=float(np.median([at_s - time_s for at_s, time_s in known])),
             reached_s=max(time_s for _, time_s in known),
-            times=np.array([point.time_s for point in message.points]),
-            angles=np.array([point.position_rad for point in message.points]),
-            joints=tuple(message.joints),
+            duration_s=message.points[-1].time_s,
             phases={phase.name: phase.start_s for phase in message.phases},
         )
     return list(motions.values())

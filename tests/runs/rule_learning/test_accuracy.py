@@ -5,8 +5,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paramove.runs.rule_learning.homography_accuracy import accuracy_of, project
-from paramove.runs.summary_statistics import summary_statistics
+from paramove.runs.rule_learning.accuracy import accuracy_of, project, summary_statistics
 from tests.runs.synthetic_run import SHOULDER, layout
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import groupby
 from typing import Any
 
@@ -13,7 +13,7 @@ from paramove.bus import topics
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.runs.recorded_run import RecordedRun, Truth
 from paramove.runs.relocations import Relocation, stages_of
-from paramove.runs.summary_statistics import summary_statistics
+from paramove.runs.rule_learning.accuracy import summary_statistics
 
 POINTS_AT = "points at "
 """The instructor's action in the recorded truth, followed by the object's name."""
@@ -109,18 +109,8 @@ def pointing_summary(places: list[PointedPlace], unrequested: Sequence[Relocatio
             place.error_of_spacing for place in pointings if place.error_of_spacing is not None
         ),
         "pointing_list": [
-            {
-                "time_s": place.time_s,
-                "meant": place.meant,
-                "true": None if place.true is None else list(place.true),
-                "believed": None if place.believed is None else list(place.believed),
-                "nearest": place.nearest,
-                "right": place.right,
-                "error_mm": place.error_mm,
-                "spacing_mm": place.spacing_mm,
-                "error_of_spacing": place.error_of_spacing,
-                "confidence": place.confidence,
-            }
+            asdict(place)
+            | {"right": place.right, "error_mm": place.error_mm, "error_of_spacing": place.error_of_spacing}
             for place in places
         ],
     }

@@ -6,7 +6,7 @@ import importlib.metadata
 import json
 import platform
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -16,16 +16,22 @@ from paramove.bus import topics
 from paramove.msgs.rule_pb2 import Speech
 from paramove.robots import RobotDescription
 from paramove.runs.recorded_run import RecordedRun
-from paramove.runs.relocations import Motion, Relocation, motions_of, relocations_of, stages_of
-from paramove.runs.rule_learning.gripper_accuracy import CommandedGripper, GripperSample, gripper_samples
-from paramove.runs.rule_learning.homography_accuracy import DetectedAtRest, MappedPoints, detected_at_rest, grid_error
+from paramove.runs.relocations import Relocation, relocations_of, stages_of
+from paramove.runs.rule_learning.accuracy import (
+    DetectedAtRest,
+    GripperSample,
+    MappedPoints,
+    detected_at_rest,
+    grid_error,
+    gripper_samples,
+    summary_statistics,
+)
 from paramove.runs.rule_learning.pointed_places import (
     PointedPlace,
     pointed_places,
     pointing_summary,
     unrequested_fetches,
 )
-from paramove.runs.summary_statistics import summary_statistics
 from paramove.runs.traffic import publishers_of
 from paramove.workspace import Workspace
 
@@ -59,19 +65,9 @@ class RunEvaluation:
         return [goal for goal in self.relocations if goal.fetches and goal.result != "refused"]
 
     @cached_property
-    def motions(self) -> list[Motion]:
-        """Every executed trajectory."""
-        return motions_of(self.run)
-
-    @cached_property
-    def commanded(self) -> CommandedGripper:
-        """The commanded gripper over time."""
-        return CommandedGripper(self.run, self.robot)
-
-    @cached_property
     def samples(self) -> list[GripperSample]:
         """Grasps and placings."""
-        return gripper_samples(self.run, self.relocations, self.motions, self.commanded)
+        return gripper_samples(self.run, self.robot, self.relocations)
 
     @cached_property
     def grid(self) -> MappedPoints | None:
@@ -147,7 +143,7 @@ class RunEvaluation:
             ],
             "topic_rates": run.traffic.rates(publishers_of(run.folder / "launch.yaml", self.workspace)),
             "loss": run.traffic.loss(),
-            "gaps": [{"recording": g.recording, "begin_s": g.begin_s, "end_s": g.end_s} for g in run.gaps],
+            "gaps": [asdict(gap) for gap in run.gaps],
             "versions": _versions(run.facts),
             "workspace": run.facts.get("workspace"),
             "wall": self._wall(),
