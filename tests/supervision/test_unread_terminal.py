@@ -99,9 +99,7 @@ def test_the_guard_kills_before_it_prints(workspace, stuck):
 
 def test_what_judges_the_run_does_not_wait_either(workspace, stuck):
     judge = "import argparse, sys\nfrom paramove.runs.after_a_run import evaluated\n\n\n"
-    judge += (
-        "sys.exit(evaluated('nodes.judge', '', {}, lambda options, console: console.print('x' * 10_000) or True, None))"
-    )
+    judge += "sys.exit(evaluated('nodes.judge', '', {}, lambda options, console: (not console.print('x' * 10_000), []), None))"
     (workspace.root / "nodes" / "judge.py").write_text(judge)
     workspace.write(
         "after_run: nodes.judge\n"

@@ -9,13 +9,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 
 from paramove.documents import exit_codes, replacing
 from paramove.runs.recorded_run import RunFolderError, gaps_in, read_facts
 from paramove.supervision import QueuedOutput
 
-Evaluate = Callable[[argparse.Namespace, Console], bool | None]
+Evaluate = Callable[[argparse.Namespace, Console], tuple[bool | None, Sequence[Path | None]]]
 
 
 def evaluated(
@@ -27,7 +28,8 @@ def evaluated(
         module: whose command it is. described: its help.
         flags: options without a value in addition to `--no-video`, with their help.
         evaluate: what is to be done with `run_folder`, an absolute path, and the flags; returns whether the run did
-            what it should, None if it is unknown. Raises RunFolderError for a folder that holds no such run.
+            what it should, None if it is unknown, and the files that it wrote, which are printed (None: not written).
+            Raises RunFolderError for a folder that holds no such run.
     """
     parser = argparse.ArgumentParser(prog=f"python -m {module}", description=described)
     parser.add_argument("run_folder", type=lambda text: Path(text).resolve())
@@ -37,7 +39,12 @@ def evaluated(
     with QueuedOutput():
         errors = Console(stderr=True, highlight=False, markup=False)
         try:
-            success = evaluate(options, Console(highlight=False, emoji=False))
+            console = Console(highlight=False, emoji=False)
+            success, written = evaluate(options, console)
+            paths = [path for path in written if path is not None]
+            width = max((len(path.name) for path in paths), default=0)
+            for path in paths:
+                console.print(f"{path.name:{width}}  {path}", markup=False, soft_wrap=True)
         except RunFolderError as error:
             errors.print(str(error), soft_wrap=True)
             return exit_codes.INPUT_MISSING
@@ -46,6 +53,16 @@ def evaluated(
             errors.print(f"{error.filename or options.run_folder}: {error.strerror or error}; {again}", soft_wrap=True)
             return exit_codes.FAILURE
     return exit_codes.JUDGED_A_FAILURE if success is False else exit_codes.OK
+
+
+def verdict(success: bool) -> str:
+    """In a word, with its colour as markup."""
+    return "[bold green]SUCCESS[/]" if success else "[bold red]FAILURE[/]"
+
+
+def rounded(value: float) -> float | None:
+    """For `run.json`: to three digits after the point; None where it is infinite or unknown."""
+    return round(float(value), 3) if np.isfinite(value) else None
 
 
 def write_run_json(folder: Path, summary: dict[str, Any]) -> Path:

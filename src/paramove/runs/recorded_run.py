@@ -10,7 +10,7 @@ import json
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -126,11 +126,11 @@ class RecordedRun:
     traffic: Traffic
     truth: Truth
     verdict: dict[str, Any]
-    facts: dict[str, Any] = field(default_factory=dict)
-    end_s: float = 0.0
-    done: bool = False
-    begun_ns: int = 0
-    gaps: tuple[RecordingGap, ...] = ()
+    facts: dict[str, Any]
+    end_s: float
+    done: bool
+    begun_ns: int
+    gaps: tuple[RecordingGap, ...]
 
     def title(self, application: str) -> str:
         """With robot and seed."""
@@ -143,7 +143,7 @@ class RecordedRun:
 
     def recording(self, name: str) -> PartedRecording:
         """Its `recording` or `truth`, to be read again for what is not in `messages`."""
-        return recording_in(self.folder, f"{name}.mcap", self.begun_ns)
+        return recording_in(self.folder, name, self.begun_ns)
 
     def received(self, topic: topics.Topic) -> list[Recorded]:
         """Messages of a topic, in order."""
@@ -164,7 +164,7 @@ def load_run(folder: Path) -> RecordedRun:
     """
     facts = read_facts(folder)
     begun_ns = int(facts.get("begun_ns", 0))
-    recording, truth_file = (recording_in(folder, f"{name}.mcap", begun_ns) for name in ("recording", "truth"))
+    recording, truth_file = (recording_in(folder, name, begun_ns) for name in ("recording", "truth"))
     recorded, traffic = _read_recording(recording)
     end_ns, done = _end_of(recorded, traffic)
     until_end = {
@@ -207,12 +207,14 @@ def _gaps(recordings: Mapping[str, PartedRecording], end_ns: float = float("inf"
 
 
 def recording_in(folder: Path, name: str, begun_ns: int = 0) -> PartedRecording:
-    """The recording of that name, finished or not, with all its parts; raises RunFolderError."""
-    recording = PartedRecording(folder / name, begun_ns)
+    """The `recording` or `truth` of a run, finished or not, with all its parts; raises RunFolderError."""
+    recording = PartedRecording(folder / f"{name}.mcap", begun_ns)
     if recording.parts:
         return recording
     content = ", ".join(sorted(path.name for path in folder.iterdir())) if folder.is_dir() else "no such folder"
-    raise RunFolderError(f"{folder} holds no {name} ({content}); a folder below runs/ of a simulated run is needed")
+    raise RunFolderError(
+        f"{folder} holds no {name}.mcap ({content}); a folder below runs/ of a simulated run is needed"
+    )
 
 
 def _read_recording(recording: PartedRecording) -> tuple[dict[str, list[Recorded]], Traffic]:

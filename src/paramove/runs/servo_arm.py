@@ -22,7 +22,7 @@ from paramove.documents import Floats, InputError, film, image, read_document, r
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording import PartedRecording
 from paramove.robots import RobotDescription
-from paramove.runs.after_a_run import evaluated, write_run_json
+from paramove.runs.after_a_run import evaluated, verdict, write_run_json
 from paramove.runs.recorded_run import RunFolderError, robot_in
 
 REACHED_M, PLACED_M = 0.015, 0.010
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return evaluated("paramove.runs.servo_arm", __doc__, {}, _evaluate, arguments)
 
 
-def _evaluate(options: argparse.Namespace, console: Console) -> bool:
+def _evaluate(options: argparse.Namespace, console: Console) -> tuple[bool, list[Path | None]]:
     folder = options.run_folder
     states = _truth_in(folder)
     results = results_of(_tasks_in(folder), states)
@@ -84,8 +84,7 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
     success = good == len(results) > 0
     content = {"success": success, "good": good, "tasks": [{**asdict(one), "good": one.good} for one in results]}
     numbers = write_run_json(folder, content)
-    word = "[bold green]SUCCESS[/]" if success else "[bold red]FAILURE[/]"
-    console.print(f"\n{word}: {good} of {len(results)} tasks done")
+    console.print(f"\n{verdict(success)}: {good} of {len(results)} tasks done")
     for one in results:
         what = f"{one.thing or 'hand'} to {_metres(one.wanted)}"
         mark = "" if one.good else "  <- too far"
@@ -98,9 +97,7 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
     if robot is not None and not options.no_video:
         video = write_film(folder, RobotDescription.load(robot), states, console)
     report = _write_report(folder, "a servo arm" if robot is None else robot.name, results, picture, video)
-    for path in (report, picture, *([] if video is None else [video]), numbers):
-        console.print(f"{path.name:16s} {path}", markup=False, soft_wrap=True)
-    return success
+    return success, [report, picture, video, numbers]
 
 
 def _truth_in(folder: Path) -> list[TruthState]:

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
+from paramove.runs.after_a_run import verdict
 
-def show_verdict(summary: dict[str, Any], written: Sequence[Path], console: Console) -> None:
-    """Print the verdict, the main numbers with their goals, and where to read on."""
-    colour = "green" if summary["success"] else "red"
-    verdict = "SUCCESS" if summary["success"] else "FAILURE"
+
+def show_verdict(summary: dict[str, Any], console: Console) -> None:
+    """Print the verdict, and the main numbers with their goals."""
     console.print(
-        f"\n[bold {colour}]{verdict}[/]: {summary['objects_placed']} of {len(summary['rules'])} objects rest in their "
-        f"own opening after {summary['simulated_s']:.0f} s of simulated time",
+        f"\n{verdict(summary['success'])}: {summary['objects_placed']} of {len(summary['rules'])} objects rest "
+        f"in their own opening after {summary['simulated_s']:.0f} s of simulated time",
         soft_wrap=True,
     )
     if not summary["success"]:
@@ -31,8 +29,6 @@ def show_verdict(summary: dict[str, Any], written: Sequence[Path], console: Cons
     for rule in summary["rules"]:
         mark = "[green]✓[/]" if rule["right"] else "[red]✗[/]"
         console.print(mark, f"“{rule['sentence'] or rule['object'] + ': nothing learnt'}”", style="dim", soft_wrap=True)
-    for path in written:
-        console.print(f"{path.name:12s} {path}", markup=False, soft_wrap=True)
 
 
 def rows_of(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
@@ -45,7 +41,7 @@ def rows_of(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
             "rules learnt",
             f"{sum(rule['right'] for rule in summary['rules'])} of {len(rules)}",
             "all",
-            all_right(summary),
+            all(rule["right"] for rule in summary["rules"]),
         ),
         ("farthest rule from its opening", mm(max((e for e in rules if e is not None), default=None)), "< 14 mm", True),
         (
@@ -70,7 +66,10 @@ def rows_of(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
         ),
         *_gripper_rows(summary),
         ("messages lost", str(summary["loss"]["total"]), "0", summary["loss"]["total"] == 0),
-        *((f"not recorded ({gap['recording']})", seconds_of(gap), "", False) for gap in summary["gaps"]),
+        *(
+            (f"not recorded ({gap['recording']})", f"{gap['begin_s']:.2f} to {gap['end_s']:.2f} s", "", False)
+            for gap in summary["gaps"]
+        ),
         ("times real time", "–" if factor is None else f"{factor:.1f}", "", True),
     ]
 
@@ -107,16 +106,6 @@ def _pointing_rows(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
 def percent(value: float | None) -> str:
     """A fraction in per cent; a dash where there is none."""
     return "–" if value is None else f"{100 * value:.0f} %"
-
-
-def all_right(summary: dict[str, Any]) -> bool:
-    """Whether every object's opening is known."""
-    return all(rule["right"] for rule in summary["rules"])
-
-
-def seconds_of(gap: dict[str, Any]) -> str:
-    """From when until when nothing was recorded."""
-    return f"{gap['begin_s']:.2f} to {gap['end_s']:.2f} s"
 
 
 def below(value: float | None, limit: float) -> bool:

@@ -15,7 +15,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from paramove.runs.after_a_run import evaluated, write_run_json
+from paramove.runs.after_a_run import evaluated, verdict, write_run_json
 from paramove.runs.pointing.run import FARTHEST_M, MEDIAN_M, load_pointing_run
 
 
@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return evaluated("paramove.runs.pointing", __doc__, {}, _evaluate, arguments)
 
 
-def _evaluate(options: argparse.Namespace, console: Console) -> bool | None:
+def _evaluate(options: argparse.Namespace, console: Console) -> tuple[bool | None, list[Path | None]]:
     run = load_pointing_run(options.run_folder)
     from paramove.runs.pointing.report import write_pointing_report
     from paramove.runs.pointing.video import write_pointing_video
@@ -32,21 +32,20 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool | None:
     summary = run.summary()
     numbers = write_run_json(run.folder, summary)
     video = None if options.no_video else write_pointing_video(run.folder, console)
-    written = [write_pointing_report(run, summary, video), *([video] if video is not None else []), numbers]
-    show(summary, written, console)
-    success: bool | None = summary["success"]
-    return success
+    report = write_pointing_report(run, summary, video)
+    show(summary, console)
+    return summary["success"], [report, video, numbers]
 
 
-def show(summary: dict[str, Any], written: Sequence[Path], console: Console) -> None:
+def show(summary: dict[str, Any], console: Console) -> None:
     """Print the verdict and the numbers of a run."""
     if summary["success"] is None:
         console.print(f"{summary['gestures']} targets in {summary['seconds']:.0f} s; the true ones are unknown")
     else:
-        word = "[bold green]SUCCESS[/]" if summary["success"] else "[bold red]FAILURE[/]"
         answered = sum(one["answers"] > 0 for one in summary["pointings"])
         console.print(
-            f"\n{word}: {answered} of {len(summary['pointings'])} pointings were answered {summary['reason']}"
+            f"\n{verdict(summary['success'])}: {answered} of {len(summary['pointings'])} pointings were answered "
+            f"{summary['reason']}"
         )
         table = Table(show_edge=False, pad_edge=False)
         for name, side in (("pointing", "left"), ("target, cm", "right"), ("error", "right"), ("after", "right")):
@@ -61,8 +60,6 @@ def show(summary: dict[str, Any], written: Sequence[Path], console: Console) -> 
             f"targets: median {error['median']} cm (goal {100 * MEDIAN_M:.0f}), worst {error['worst']} cm "
             f"(goal {100 * FARTHEST_M:.0f}); hand: RMS {', '.join(map(str, hand))} cm along x, y, z"
         )
-    for path in written:
-        console.print(f"{path.name:12s} {path}", markup=False, soft_wrap=True)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from paramove.bus import topics
 from paramove.documents import Floats
 from paramove.msgs.gesture_pb2 import Gesture
+from paramove.runs.after_a_run import rounded
 from paramove.runs.recorded_run import RunFolderError, recording_in
 
 FARTHEST_M = 0.10
@@ -78,11 +79,6 @@ class PointingRun:
     spurious: tuple[tuple[float, Floats], ...]
     gestures: int
 
-    @property
-    def with_truth(self) -> bool:
-        """Whether the run can be judged: there is none of a real person."""
-        return bool(self.pointings)
-
     def summary(self) -> dict[str, Any]:
         """All numbers, as plain JSON."""
         numbers: dict[str, Any] = {
@@ -91,7 +87,7 @@ class PointingRun:
             "gestures": self.gestures,
             "unsure_share": float(self.unsure.mean()) if len(self.unsure) else 0.0,
         }
-        if not self.with_truth:
+        if not self.pointings:  # of a real person there is no truth
             return numbers | {"success": None, "reason": "without truth nothing is judged"}
         errors = np.array([one.error for one in self.pointings])
         missed = self.hand - self.true_hand
@@ -104,18 +100,18 @@ class PointingRun:
             "pointings": [
                 {
                     "target": [round(float(value), 4) for value in one.target],
-                    "error_cm": _rounded(100 * one.error),
-                    "delay_s": _rounded(one.delay_s),
-                    "certainty": _rounded(one.answers[0][2]) if one.answers else None,
+                    "error_cm": rounded(100 * one.error),
+                    "delay_s": rounded(one.delay_s),
+                    "certainty": rounded(one.answers[0][2]) if one.answers else None,
                     "answers": len(one.answers),
                 }
                 for one in self.pointings
             ],
             "target_error_cm": {
-                "median": _rounded(100 * float(np.median(errors))),
-                "worst": _rounded(100 * errors.max()),
+                "median": rounded(100 * float(np.median(errors))),
+                "worst": rounded(100 * errors.max()),
             },
-            "hand_rms_cm": [_rounded(100 * float(value)) for value in rms],
+            "hand_rms_cm": [rounded(100 * float(value)) for value in rms],
             "spurious": len(self.spurious),
         }
 
@@ -137,7 +133,7 @@ def load_pointing_run(folder: Path) -> PointingRun:
     poses: list[tuple[float, Any]] = []
     gestures: list[tuple[float, Floats, float]] = []
     needed = {topics.ACTION_ESTIMATE.name, topics.HUMAN_ARM_POSE.name, topics.GESTURES.name}
-    for recorded in recording_in(folder, "recording.mcap").read(needed):
+    for recorded in recording_in(folder, "recording").read(needed):
         time_s = recorded.log_ns * 1e-9
         if recorded.topic != topics.GESTURES.name:
             (estimates if recorded.topic == topics.ACTION_ESTIMATE.name else poses).append((time_s, recorded.message))
@@ -189,7 +185,7 @@ def _of_poses(messages: list[Any]) -> dict[str, Any]:
 
 def _truth(folder: Path) -> list[tuple[float, Any]]:
     try:
-        recording = recording_in(folder, "truth.mcap")
+        recording = recording_in(folder, "truth")
     except RunFolderError:
         return []
     return [(recorded.log_ns * 1e-9, recorded.message) for recorded in recording.read({topics.TRUTH_ARM.name})]
@@ -224,7 +220,3 @@ def _xyz(point: Any) -> tuple[float, float, float]:
 
 def _deviations(point: Any) -> tuple[float, float, float]:
     return point.x_deviation, point.y_deviation, point.z_deviation
-
-
-def _rounded(value: float) -> float | None:
-    return round(float(value), 3) if np.isfinite(value) else None

@@ -78,7 +78,7 @@ def _frames(folder: Path) -> Iterator[tuple[Any, Any | None, str]]:
     captions: list[tuple[int, str]] = []
     camera = _camera(folder)
     needed = {CAMERA, topics.ACTION_OUTLINE.name, topics.GESTURES.name, topics.GESTURES_SCENE.name}
-    for recorded in recording_in(folder, "recording.mcap").read(needed):
+    for recorded in recording_in(folder, "recording").read(needed):
         if recorded.topic == CAMERA:
             waiting[recorded.log_ns] = recorded.message
         elif recorded.topic == topics.ACTION_OUTLINE.name:

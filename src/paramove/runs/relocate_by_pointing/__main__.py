@@ -16,7 +16,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from paramove.runs.after_a_run import evaluated, write_run_json
+from paramove.runs.after_a_run import evaluated, verdict, write_run_json
 from paramove.runs.recorded_run import load_run
 from paramove.runs.relocate_by_pointing.run import GOAL, SCALE, pointed_relocations_of, summary_of
 
@@ -26,7 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return evaluated("paramove.runs.relocate_by_pointing", __doc__, {}, _evaluate, arguments)
 
 
-def _evaluate(options: argparse.Namespace, console: Console) -> bool:
+def _evaluate(options: argparse.Namespace, console: Console) -> tuple[bool, list[Path | None]]:
     run = load_run(options.run_folder)
     relocations = pointed_relocations_of(run)
     summary = summary_of(run, relocations)
@@ -36,17 +36,16 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
     numbers = write_run_json(run.folder, summary)
     video = None if options.no_video else write_relocation_video(run, console)
     report = write_relocation_report(run, relocations, summary, video)
-    show(summary, [report, *([video] if video is not None else []), numbers], console)
-    return bool(summary["success"])
+    show(summary, console)
+    return summary["success"], [report, video, numbers]
 
 
-def show(summary: dict[str, Any], written: Sequence[Path], console: Console) -> None:
+def show(summary: dict[str, Any], console: Console) -> None:
     """Print the verdict and the numbers of a run."""
-    word = "[bold green]SUCCESS[/]" if summary["success"] else "[bold red]FAILURE[/]"
     relocations = summary["relocations"]
     console.print(
-        f"\n{word}: {summary['good']} of {len(relocations)} times the object ended within {1e3 * GOAL:.1f} mm "
-        f"of the place pointed at",
+        f"\n{verdict(summary['success'])}: {summary['good']} of {len(relocations)} times the object ended "
+        f"within {1e3 * GOAL:.1f} mm of the place pointed at",
         soft_wrap=True,
     )
     console.print(f"1 mm here is {1 / SCALE:.1f} mm for a grown person at a table: the scale is {SCALE}", style="dim")
@@ -68,8 +67,6 @@ def show(summary: dict[str, Any], written: Sequence[Path], console: Console) -> 
         f"unwanted contacts {summary['unwanted_contacts']}; {summary['simulated_s']:.0f} s of simulated time",
         soft_wrap=True,
     )
-    for path in written:
-        console.print(f"{path.name:16s} {path}", markup=False, soft_wrap=True)
 
 
 def _cm(place: list[float] | None) -> str:

@@ -13,7 +13,7 @@ from matplotlib.patches import Circle, Rectangle
 from paramove.action_space import ball_colour
 from paramove.bus import topics
 from paramove.cameras import Frame, decode, encode
-from paramove.documents import film, image, report_page, section
+from paramove.documents import film, image, report_page, section, table
 from paramove.runs import plots
 from paramove.runs.pointing.video import drawn
 from paramove.runs.recorded_run import RecordedRun
@@ -96,17 +96,17 @@ def _two(picture: bytes | None, one: PointedRelocation) -> str:
 
 def _table(summary: dict[str, Any]) -> str:
     heads = ("place", "certain", "recognition error, mm", "placing error, mm", "error, mm", "at human scale, cm", "")
-    rows = "".join(
-        f"<tr><td>{number}</td><td class=n>{100 * one['certainty']:.0f} %</td>"
-        + "".join(
-            f"<td class=n>{'–' if one[name] is None else format(one[name], '.1f')}</td>"
-            for name in ("recognition_error_mm", "placing_error_mm", "error_mm", "error_cm_at_human_scale")
-        )
-        + ("<td class=yes>good</td></tr>" if one["good"] else f"<td class=no>{escape(one['reason'] or 'no')}</td></tr>")
+    errors = ("recognition_error_mm", "placing_error_mm", "error_mm", "error_cm_at_human_scale")
+    rows = [
+        [
+            str(number),
+            f"{100 * one['certainty']:.0f} %",
+            *("–" if one[name] is None else f"{one[name]:.1f}" for name in errors),
+            "<span class=yes>good</span>" if one["good"] else f"<span class=no>{escape(one['reason'] or 'no')}</span>",
+        ]
         for number, one in enumerate(summary["relocations"], start=1)
-    )
-    header = "".join(f"<th{' class=n' if 0 < number < 6 else ''}>{head}</th>" for number, head in enumerate(heads))
-    return f"<table><tr>{header}</tr>{rows}</table>"
+    ]
+    return table(heads, rows, numbers=range(1, 6))
 
 
 def _pictures(run: RecordedRun, relocations: list[PointedRelocation]) -> dict[int, bytes]:

@@ -12,6 +12,7 @@ from paramove.documents import Floats
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.rule_pb2 import Speech
+from paramove.runs.after_a_run import rounded
 from paramove.runs.recorded_run import RecordedRun, RunFolderError
 from paramove.runs.relocations import Relocation, relocations_of
 
@@ -79,15 +80,15 @@ class PointedRelocation:
             "recognised": _places(self.recognised),
             "final": _places(self.final),
             "certainty": round(self.certainty, 3),
-            "error_mm": _rounded(1e3 * self.error),
-            "recognition_error_mm": _rounded(1e3 * self.recognition_error),
-            "placing_error_mm": _rounded(1e3 * self.placing_error),
-            "error_cm_at_human_scale": _rounded(1e2 * self.error / SCALE),
+            "error_mm": rounded(1e3 * self.error),
+            "recognition_error_mm": rounded(1e3 * self.recognition_error),
+            "placing_error_mm": rounded(1e3 * self.placing_error),
+            "error_cm_at_human_scale": rounded(1e2 * self.error / SCALE),
             "stands": self.stands,
             "result": self.result,
             "reason": self.reason,
-            "recognised_after_s": _rounded(self.recognised_s - self.pointed_s),
-            "took_s": _rounded(self.final_s - self.recognised_s),
+            "recognised_after_s": rounded(self.recognised_s - self.pointed_s),
+            "took_s": rounded(self.final_s - self.recognised_s),
         }
 
 
@@ -125,8 +126,8 @@ def summary_of(run: RecordedRun, relocations: list[PointedRelocation]) -> dict[s
         "good": good,
         "relocations": [one.as_json() for one in relocations],
         "error_mm": {
-            "median": _rounded(1e3 * float(np.median(errors))) if len(errors) else None,
-            "worst": _rounded(1e3 * float(errors.max())) if len(errors) else None,
+            "median": rounded(1e3 * float(np.median(errors))) if len(errors) else None,
+            "worst": rounded(1e3 * float(errors.max())) if len(errors) else None,
         },
         "asked": requests,
         "refused": sum(one.result == "refused" for one in goals),
@@ -212,7 +213,3 @@ def _apart(one: Floats, other: Floats | None) -> float:
 
 def _places(place: Floats) -> list[float]:
     return [round(float(value), 5) for value in place]
-
-
-def _rounded(value: float) -> float | None:
-    return round(float(value), 3) if np.isfinite(value) else None

@@ -24,36 +24,28 @@ from paramove.workspace import Workspace
 ROBOT = Path("robot_description/hoap3")
 
 
-def evaluate(folder: Path, workspace: Workspace) -> RunEvaluation:
-    """Read a run; raises RunFolderError or DescriptionError."""
-    return RunEvaluation(load_run(folder), RobotDescription.load(workspace.find(ROBOT)), workspace)
-
-
-def write_summary(evaluation: RunEvaluation) -> Path:
-    """Write `run.json` into the run's folder."""
-    path = evaluation.run.folder / "run.json"
-    with replacing(path) as unfinished:
-        unfinished.write_text(as_json(evaluation.summary), encoding="utf-8")
-    return path
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     flags = {"--no-report": "write run.json alone"}
     return evaluated("paramove.runs.rule_learning", __doc__, flags, _evaluate, arguments)
 
 
-def _evaluate(options: argparse.Namespace, console: Console) -> bool:
-    evaluation = evaluate(options.run_folder, Workspace.here())
-    written = [write_summary(evaluation)]
+def _evaluate(options: argparse.Namespace, console: Console) -> tuple[bool, list[Path | None]]:
+    workspace = Workspace.here()
+    run = load_run(options.run_folder)
+    evaluation = RunEvaluation(run, RobotDescription.load(workspace.find(ROBOT)), workspace)
+    numbers = run.folder / "run.json"
+    with replacing(numbers) as unfinished:
+        unfinished.write_text(as_json(evaluation.summary), encoding="utf-8")
+    report = video = None
     if not options.no_report:
         from paramove.runs.rule_learning.report import write_report
         from paramove.runs.rule_learning.video import write_video
 
         video = None if options.no_video else write_video(evaluation, console)
-        written = [write_report(evaluation, video), *([video] if video is not None else []), *written]
-    show_verdict(evaluation.summary, written, console)
-    return bool(evaluation.summary["success"])
+        report = write_report(evaluation, video)
+    show_verdict(evaluation.summary, console)
+    return evaluation.summary["success"], [report, video, numbers]
 
 
 if __name__ == "__main__":

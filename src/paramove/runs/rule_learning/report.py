@@ -28,19 +28,19 @@ def page(evaluation: RunEvaluation, video: Path | None) -> str:
     parts = [
         _tiles(summary),
         _video(video),
-        _plot(
+        section(
             "What happened when",
             "Stages of the application, goals of the arm in the colour of the object, and the robot's observations.",
             svg_of(plots.timeline, evaluation, (11, 2.5)),
         ),
         _rules(summary),
         "<div class=two>",
-        _plot(
+        section(
             "The working surface from above",
             "Rings are true, crosses and dots are the robot's estimates. The robot stands below, looking up.",
             svg_of(plots.plan, evaluation, (5.6, 3.7)),
         ),
-        _plot(
+        section(
             "How well the robot knows its camera",
             "Error of its own calibration over the working area; the camera's true pose and lens are known only here.",
             svg_of(plots.homography, evaluation, (5.6, 3.7)),
@@ -48,7 +48,7 @@ def page(evaluation: RunEvaluation, video: Path | None) -> str:
         "</div><p></p>",
         _pointings(summary),
         _grasps(summary),
-        _plot(
+        section(
             "The arm",
             "Measured joint angles; the gripper's height; its distance from its command and from its targets.",
             svg_of(plots.motion, evaluation, (11, 5.6)),
@@ -83,17 +83,12 @@ def _video(video: Path | None) -> str:
     if video is None:
         return ""
     data = base64.b64encode(video.read_bytes()).decode("ascii")
-    kind = f"video/{video.suffix.removeprefix('.')}"
-    return (
-        "<section><h2>The run</h2><p class=why>Left, the camera with the robot's estimates; right, the world, "
-        "which the robot does not see. Boxes: tracked objects. Circles: estimated openings, at the height of an "
-        "object's middle. Arrow: its goal.</p>"
-        f"<video controls preload=metadata src='data:{kind};base64,{data}'></video></section>"
+    return section(
+        "The run",
+        "Left, the camera with the robot's estimates; right, the world, which the robot does not see. Boxes: tracked "
+        "objects. Circles: estimated openings, at the height of an object's middle. Arrow: its goal.",
+        f"<video controls preload=metadata src='data:video/mp4;base64,{data}'></video>",
     )
-
-
-def _plot(title: str, why: str, svg: str) -> str:
-    return f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p>{svg}</section>"
 
 
 def _rules(summary: dict[str, Any]) -> str:
