@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -27,9 +28,10 @@ def result(seed, success=True, **values):
 def test_results_of_other_settings_are_not_used(tmp_path):
     result_file(tmp_path, 1).write_text(json.dumps(result(1)))
     result_file(tmp_path, 2).write_text(json.dumps(result(2, settings=["camera.width=100"])))
-    assert list(finished(tmp_path, [0, 1, 2])) == [1]
-    assert list(finished(tmp_path, [0, 1, 2], ["camera.width=100"])) == [2]
-    assert list(finished(tmp_path, [0, 1, 2], robot="koch_v1_1")) == []
+    options = BatchOptions(tmp_path, tmp_path)
+    assert list(finished([0, 1, 2], options)) == [1]
+    assert list(finished([0, 1, 2], replace(options, settings=("camera.width=100",)))) == [2]
+    assert list(finished([0, 1, 2], replace(options, robot="koch_v1_1"))) == []
 
 
 def test_totals_and_enough():
@@ -89,5 +91,5 @@ def test_each_seed_runs_in_processes_of_its_own_and_interrupted_ones_are_not_kep
     run_batch([0, 1, 2], options, begun.append, ended.append)
     assert begun == [0, 1, 2]
     assert sorted((item["seed"], item["success"]) for item in ended) == [(0, True), (1, False), (2, True)]
-    assert list(finished(options.folder, range(3))) == [0, 2]
+    assert list(finished(range(3), options)) == [0, 2]
     assert sys.executable  # the same interpreter is used for the runs

@@ -151,9 +151,9 @@ def _batch(
     check(load(workspace, "rule_learning", overlays or None, settings, robot=robot), workspace)
     folder = (runs or workspace.root / RUNS).resolve()
     options = BatchOptions(
-        workspace.root, folder, jobs, video, video, not drop_recordings, tuple(settings), tuple(overlays), robot
+        workspace.root, folder, jobs, video, not drop_recordings, tuple(settings), tuple(overlays), robot
     )
-    results = {} if again else finished(folder, requested, settings, overlays, robot)
+    results = {} if again else finished(requested, options)
     if results:
         console.print(f"results of {len(results)} seeds are taken from {folder} (--again repeats them)", soft_wrap=True)
     missing = [seed for seed in requested if seed not in results]

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from paramove.documents import exit_codes, replacing
+from paramove.runs.recorded_run import judged
 
 APPLICATION = "rule_learning"
 EVALUATOR = "paramove.runs.rule_learning"
@@ -33,8 +34,7 @@ class BatchOptions:
         workspace: Root of the workspace.
         folder: Where the runs and results are stored.
         jobs: Runs at the same time.
-        video: Whether each run gets its video (and takes longer).
-        report: Whether each run gets its report.
+        video: Whether each run gets its video and report (and takes longer).
         keep_recordings: Whether the recordings are kept; a run takes about 0.5 GB.
         settings: `node.parameter=value`, as `paramove launch --set`.
         overlays: As `paramove launch --with`; none: the launch file's own.
@@ -45,7 +45,6 @@ class BatchOptions:
     folder: Path
     jobs: int = 1
     video: bool = False
-    report: bool = False
     keep_recordings: bool = True
     settings: tuple[str, ...] = ()
     overlays: tuple[str, ...] = ()
@@ -68,18 +67,12 @@ def result_file(folder: Path, seed: int) -> Path:
     return folder / f"seed_{seed:04d}.json"
 
 
-def finished(
-    folder: Path,
-    seeds: Iterable[int],
-    settings: Sequence[str] = (),
-    overlays: Sequence[str] = (),
-    robot: str | None = None,
-) -> dict[int, dict[str, Any]]:
+def finished(seeds: Iterable[int], options: BatchOptions) -> dict[int, dict[str, Any]]:
     """Results that are there already and were made with the same settings, overlays and robot."""
-    wanted = (list(settings), list(overlays), robot)
+    wanted = (list(options.settings), list(options.overlays), options.robot)
     results = {}
     for seed in seeds:
-        path = result_file(folder, seed)
+        path = result_file(options.folder, seed)
         if path.is_file():
             result = json.loads(path.read_text(encoding="utf-8"))
             if (result.get("settings", []), result.get("overlays", []), result.get("robot")) == wanted:
@@ -136,24 +129,15 @@ def run_seed(seed: int, options: BatchOptions, children: Children) -> dict[str, 
         return result | {"success": False, "reason": "interrupted"}
     if (folder / "truth.mcap").is_file() and not (folder / "run.json").is_file():
         evaluate = [sys.executable, "-m", EVALUATOR, str(folder)]
-        evaluate += [] if options.video else ["--no-video"]
-        evaluate += [] if options.report else ["--no-report"]
+        evaluate += [] if options.video else ["--no-video", "--no-report"]
         children.call(evaluate, options.workspace, environment, options.folder / f"seed_{seed:04d}.log")
-    result |= _summary_in(folder)
+    result |= judged(folder / "run.json", "the run ended before it could be evaluated; see its logs")
     with replacing(result_file(options.folder, seed)) as unfinished:
         text = json.dumps(result, indent=2, sort_keys=True, ensure_ascii=False)
         unfinished.write_text(text + "\n", encoding="utf-8")
     if not options.keep_recordings and result["success"]:
         (folder / "recording.mcap").unlink(missing_ok=True)
     return result
-
-
-def _summary_in(folder: Path) -> dict[str, Any]:
-    path = folder / "run.json"
-    if not path.is_file():
-        return {"success": False, "reason": "the run ended before it could be evaluated; see its logs"}
-    summary: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return summary
 
 
 class Children:

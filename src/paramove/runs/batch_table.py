@@ -10,30 +10,32 @@ from rich.table import Table
 
 from paramove.runs.verdict_table import below
 
-COLUMNS: tuple[tuple[str, tuple[str, ...], str], ...] = (
-    ("placed", ("objects_placed",), "total"),
-    ("grasps", ("grasps",), "total"),
-    ("first\ntry", ("grasps_first_try",), "total"),
-    ("calib.\ngrasps", ("calibration_grasps",), "total"),
-    ("first\ntry ", ("calibration_grasps_first_try",), "total"),
-    ("unw.\ncont.", ("unwanted_contacts",), "total"),
-    ("penetr.\nmm", ("deepest_penetration_mm",), "max"),
-    ("homogr.\nmm", ("homography_error_mm", "median"), "median"),
-    ("max\nmm", ("homography_error_mm", "max"), "max"),
-    ("comm.\nmm", ("gripper_error_commanded_mm", "both", "max"), "max"),
-    ("phys.\nmm", ("gripper_error_physical_mm", "both", "max"), "max"),
-    ("lost", ("loss", "total"), "total"),
-    ("sim.\ns", ("simulated_s",), "median"),
-    ("× real\ntime", ("wall", "realtime_factor"), "median"),
-)
-"""Heading, keys in run.json, and how the column is summed up."""
+Column = tuple[str, tuple[str, ...], str, float | None]
+"""Heading, keys in run.json, how the column is summed up, and the goal: no larger value, if there is one."""
 
-POINTING_COLUMNS: tuple[tuple[str, tuple[str, ...], str], ...] = (
-    ("pointed", ("pointings",), "total"),
-    ("right", ("pointings_right",), "total"),
-    ("error\nmm", ("pointing_error_mm", "median"), "median"),
-    ("max\nmm ", ("pointing_error_mm", "max"), "max"),
-    ("max of\nspacing", ("pointing_error_of_spacing", "max"), "max"),
+COLUMNS: tuple[Column, ...] = (
+    ("placed", ("objects_placed",), "total", None),
+    ("grasps", ("grasps",), "total", None),
+    ("first\ntry", ("grasps_first_try",), "total", None),
+    ("calib.\ngrasps", ("calibration_grasps",), "total", None),
+    ("first\ntry ", ("calibration_grasps_first_try",), "total", None),
+    ("unw.\ncont.", ("unwanted_contacts",), "total", 0.0),
+    ("penetr.\nmm", ("deepest_penetration_mm",), "max", 0.7),
+    ("homogr.\nmm", ("homography_error_mm", "median"), "median", 3.0),
+    ("max\nmm", ("homography_error_mm", "max"), "max", None),
+    ("comm.\nmm", ("gripper_error_commanded_mm", "both", "max"), "max", 0.5),
+    ("phys.\nmm", ("gripper_error_physical_mm", "both", "max"), "max", 2.0),
+    ("lost", ("loss", "total"), "total", 0.0),
+    ("sim.\ns", ("simulated_s",), "median", None),
+    ("× real\ntime", ("wall", "realtime_factor"), "median", None),
+)
+
+POINTING_COLUMNS: tuple[Column, ...] = (
+    ("pointed", ("pointings",), "total", None),
+    ("right", ("pointings_right",), "total", None),
+    ("error\nmm", ("pointing_error_mm", "median"), "median", None),
+    ("max\nmm ", ("pointing_error_mm", "max"), "max", None),
+    ("max of\nspacing", ("pointing_error_of_spacing", "max"), "max", None),
 )
 """The same for runs in which pointing is tracked in action space."""
 
@@ -65,13 +67,13 @@ def totals_of(results: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Counts, and for each column its total, median or largest value, under the path of its keys."""
     succeeded = sum(bool(result.get("success")) for result in results)
     totals: dict[str, Any] = {"runs": len(results), "succeeded": succeeded, "needed_share": NEEDED_FRACTION}
-    for _, keys, statistic in columns_of(results):
+    for _, keys, statistic, _ in columns_of(results):
         values = [value for result in results if (value := value_of(result, keys)) is not None]
         totals[f"{'.'.join(keys)} ({statistic})"] = _summed_up(values, statistic) if values else None
     return totals | {"training_hull.from": {where: _hull_total(results, where) for _, where in HULL_COLUMNS}}
 
 
-def columns_of(results: Sequence[dict[str, Any]]) -> tuple[tuple[str, tuple[str, ...], str], ...]:
+def columns_of(results: Sequence[dict[str, Any]]) -> tuple[Column, ...]:
     """The columns that these results fill."""
     tracked = any("pointings" in result for result in results)
     return (*COLUMNS, *POINTING_COLUMNS) if tracked else COLUMNS
@@ -116,13 +118,13 @@ def table_of(results: Sequence[dict[str, Any]]) -> Table:
     for heading, where in HULL_COLUMNS:
         table.add_column(heading, justify="right", footer=_succeeded_of_tried(totals["training_hull.from"][where]))
     columns = columns_of(results)
-    for heading, keys, statistic in columns:
+    for heading, keys, statistic, _ in columns:
         foot = totals[f"{'.'.join(keys)} ({statistic})"]
         footer = f"{short(foot)}\n{statistic}" if foot is not None else "–"
         table.add_column(heading, justify="right", footer=footer)
     for result in sorted(results, key=lambda item: int(item["seed"])):
         verdict = "[green]yes[/]" if result.get("success") else "[red]no[/]"
-        cells = [_cell(heading, value_of(result, keys)) for heading, keys, _ in columns]
+        cells = [_cell(value_of(result, keys), limit) for _, keys, _, limit in columns]
         hulls = [_succeeded_of_tried(hull_counts(result, where)) for _, where in HULL_COLUMNS]
         table.add_row(str(result["seed"]), verdict, *hulls, *cells)
     return table
@@ -137,16 +139,5 @@ def short(value: float | None) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.2f}"
 
 
-_LIMITS = {
-    "unw.\ncont.": 0.0,
-    "penetr.\nmm": 0.7,
-    "homogr.\nmm": 3.0,
-    "comm.\nmm": 0.5,
-    "phys.\nmm": 2.0,
-    "lost": 0.0,
-}
-
-
-def _cell(heading: str, value: float | None) -> str:
-    limit = _LIMITS.get(heading)
+def _cell(value: float | None, limit: float | None) -> str:
     return short(value) if limit is None or below(value, limit) else f"[yellow]{short(value)}[/]"

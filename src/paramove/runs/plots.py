@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from paramove.bus import topics
+from paramove.msgs.gesture_pb2 import Gesture
 from paramove.runs.relocations import stages_of
 from paramove.runs.rule_learning.accuracy import GOAL_MM, GRID_STEPS, GRID_X, GRID_Y
 from paramove.runs.rule_learning.summary import RunEvaluation
@@ -82,8 +83,6 @@ def timeline(evaluation: RunEvaluation, figure: Figure) -> None:
 
 
 def _gestures(evaluation: RunEvaluation, axes: Axes) -> None:
-    from paramove.msgs.gesture_pb2 import Gesture
-
     marks = {
         Gesture.KIND_MOVED: (">", "moves"),
         Gesture.KIND_RESTED: ("s", "rests"),

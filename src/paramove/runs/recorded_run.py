@@ -178,7 +178,7 @@ def load_run(folder: Path) -> RecordedRun:
         messages=until_end,
         traffic=traffic,
         truth=truth,
-        verdict=_read_json(folder / "truth.json"),
+        verdict=judged(folder / "truth.json", "the judge wrote no truth.json"),
         facts=facts,
         end_s=end_ns * 1e-9,
         done=done,
@@ -275,9 +275,10 @@ def _upright(body: Any) -> float:
     return float(1 - 2 * (x * x + y * y))
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def judged(path: Path, otherwise: str) -> dict[str, Any]:
+    """A verdict on a run in a file; without the file, a failure with that reason."""
     if not path.is_file():
-        return {"success": False, "reason": f"the judge wrote no {path.name}"}
+        return {"success": False, "reason": otherwise}
     content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return content
 

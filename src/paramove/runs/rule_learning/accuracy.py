@@ -29,6 +29,8 @@ STANDING = 0.003  # m; an object this near to its standing height rests on the s
 UPRIGHT = 0.99
 GOAL_MM = 3.0
 """Largest median error over the working area."""
+Place = tuple[float, float]
+"""x, y, m, on the working plane in the right shoulder's frame."""
 _AT_REST = (Gesture.KIND_APPEARED, Gesture.KIND_RESTED)
 
 
@@ -59,13 +61,18 @@ class DetectedAtRest:
 
     time_s: float
     object: str
-    true: tuple[float, float]
-    estimated: tuple[float, float]
+    true: Place
+    estimated: Place
 
     @property
     def error_mm(self) -> float:
         """Distance."""
-        return 1e3 * float(np.hypot(self.estimated[0] - self.true[0], self.estimated[1] - self.true[1]))
+        return apart_mm(self.true, self.estimated)
+
+
+def apart_mm(one: Place, other: Place) -> float:
+    """Distance of two positions (x, y) in m."""
+    return 1e3 * float(np.hypot(other[0] - one[0], other[1] - one[1]))
 
 
 def project(layout: Any, points: ArrayLike) -> Floats:

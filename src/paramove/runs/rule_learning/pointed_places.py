@@ -7,17 +7,14 @@ from dataclasses import asdict, dataclass
 from itertools import groupby
 from typing import Any
 
-import numpy as np
-
 from paramove.bus import topics
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.runs.recorded_run import RecordedRun, Truth
 from paramove.runs.relocations import Relocation, stages_of
-from paramove.runs.rule_learning.accuracy import summary_statistics
+from paramove.runs.rule_learning.accuracy import Place, apart_mm, summary_statistics
 
 POINTS_AT = "points at "
 """The instructor's action in the recorded truth, followed by the object's name."""
-Place = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -47,7 +44,7 @@ class PointedPlace:
         """Horizontal distance of the estimated target from the middle of the object."""
         if self.true is None or self.believed is None:
             return None
-        return 1e3 * float(np.hypot(self.believed[0] - self.true[0], self.believed[1] - self.true[1]))
+        return apart_mm(self.true, self.believed)
 
     @property
     def error_of_spacing(self) -> float | None:
@@ -133,10 +130,11 @@ def _place(run: RecordedRun, meant: str, begin_s: float, gesture: Any | None) ->
     standing = _standing(run.truth, time_s)
     true = standing.get(meant)
     believed = None if gesture is None else (float(gesture.x), float(gesture.y))
-    near = "" if believed is None else min(standing, key=lambda name: _apart_mm(standing[name], believed), default="")
-    others = [_apart_mm(true, place) for name, place in standing.items() if true is not None and name != meant]
+    from_estimate = {} if believed is None else {name: apart_mm(place, believed) for name, place in standing.items()}
+    nearest = min(from_estimate, key=from_estimate.__getitem__, default="")
+    others = [] if true is None else [apart_mm(true, place) for name, place in standing.items() if name != meant]
     confidence = None if gesture is None else float(gesture.confidence)
-    return PointedPlace(time_s, meant, true, believed, near, min(others, default=None), confidence)
+    return PointedPlace(time_s, meant, true, believed, nearest, min(others, default=None), confidence)
 
 
 def _standing(truth: Truth, time_s: float) -> dict[str, Place]:
@@ -152,9 +150,3 @@ def _standing(truth: Truth, time_s: float) -> dict[str, Place]:
 
 def _in_apply(run: RecordedRun, time_s: float) -> bool:
     return any(one["stage"] == "apply" and one["begin_s"] <= time_s <= one["end_s"] for one in stages_of(run))
-
-
-def _apart_mm(a: Place | None, b: Place | None) -> float:
-    assert a is not None
-    assert b is not None
-    return 1e3 * float(np.hypot(a[0] - b[0], a[1] - b[1]))
