@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from paramove.bus import topics
-from paramove.bus.visitor import BusVisitor
+from paramove.bus.inspection import BusVisitor
 from paramove.recording.parts import PartedRecording
 from tests.supervision.conftest import until
 from tests.supervision.test_unread_terminal import full_pipe

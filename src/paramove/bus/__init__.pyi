@@ -18,6 +18,8 @@ from .envelope import RejectedError as RejectedError
 from .envelope import pack as pack
 from .envelope import unpack as unpack
 from .exchange import Exchange as Exchange
+from .inspection import BusVisitor as BusVisitor
+from .inspection import publish_now as publish_now
 from .lockstep import answers_socket as answers_socket
 from .lockstep import member_mark as member_mark
 from .lockstep import member_socket as member_socket
@@ -44,5 +46,3 @@ from .topics import CLOCK as CLOCK
 from .topics import HUMAN_ARM_POSE as HUMAN_ARM_POSE
 from .topics import TOPICS as TOPICS
 from .topics import Topic as Topic
-from .visitor import BusVisitor as BusVisitor
-from .visitor import publish_now as publish_now

@@ -1,10 +1,11 @@
-"""Looks at a running bus from outside, without taking part. For the command line and the dashboard.
+"""A running bus from outside, for programs that are no node of the run, such as a command in a terminal.
 
-Every call returns within its timeout; a publisher that is dead, busy or absent is reported as such.
+Every function returns within its timeout; a publisher that is dead, busy or absent is reported as such.
 """
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -15,11 +16,46 @@ import zmq
 
 from paramove.bus import topics
 from paramove.bus.endpoint import holder_of, is_held, socket_path
+from paramove.bus.publisher import Publisher
 from paramove.bus.subscriber import Received, Subscriber
 from paramove.bus.topics import Topic
-from paramove.bus.visitor import BusVisitor
 
 _POLL_MS = 50
+
+
+class BusVisitor(contextlib.ExitStack):
+    """Sockets on a run's bus, while it is a context.
+
+    Args:
+        folder: Of the run's bus.
+        name: Name under which it publishes, if it does.
+    """
+
+    def __init__(self, folder: Path, name: str = "") -> None:
+        super().__init__()
+        self._folder, self._name = folder, name
+        self._owned = self.enter_context(contextlib.ExitStack())  # released after the ZeroMQ context has ended
+        self._context: zmq.Context[Any] = self.enter_context(zmq.Context())
+
+    def publisher(self, topic: Topic) -> Publisher:
+        """The one publisher of a topic. Raises TopicTakenError and BusFolderError."""
+        publisher = Publisher(self._context, self._folder, topic, self._name)
+        self._owned.callback(publisher.ownership.release)
+        self.callback(publisher.close)
+        return publisher
+
+    def subscriber(self, topic: Topic) -> Subscriber:
+        """A subscriber to a topic."""
+        subscriber = Subscriber(self._context, self._folder, topic)
+        self.callback(subscriber.close)
+        return subscriber
+
+
+def publish_now(publisher: Publisher, message: Any) -> None:
+    """Publishes a person's request with the present time as `captured`."""
+    now_ns = time.monotonic_ns()
+    message.captured.FromNanoseconds(now_ns)
+    publisher.publish(message, now_ns, now_ns)
 
 
 @dataclass(frozen=True)

@@ -146,10 +146,6 @@ class RecordedBus:
         """Ends every loop over events."""
         self.stopped = True
 
-    def close(self) -> None:
-        """Ends every loop over events."""
-        self.stopped = True
-
     def hands_out(self, received: Received) -> bool:
         """Whether the node gets a message."""
         reason = unsound(received.message) if self._protected else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +43,6 @@ class Received:
         captured_ns: Time at which the content was measured, ns of the bus clock.
         published_ns: When it was published.
         sequence: Of its publisher's epoch.
-        payload: The encoded message, for a recorder.
     """
 
     topic: Topic
@@ -51,7 +50,6 @@ class Received:
     captured_ns: int
     published_ns: int
     sequence: int
-    payload: bytes = field(default=b"", repr=False, compare=False)
 
 
 class Subscriber:
@@ -105,9 +103,7 @@ class Subscriber:
                 self.counter.messages -= 1
                 self._reject(error)
                 continue
-            return Received(
-                self.topic, message, envelope.captured_ns, envelope.published_ns, envelope.sequence, payload
-            )
+            return Received(self.topic, message, envelope.captured_ns, envelope.published_ns, envelope.sequence)
         return None
 
     def receive_raw(self, ready: bool = False) -> tuple[Envelope, bytes] | None:

@@ -282,16 +282,11 @@ def _data_of(content: Content, at: int, max_bytes: int) -> bytes:
     if min(end, len(content)) - at > RECORD_BYTES:
         raise ValueError("a chunk that is too large")
     missing = max(0, end - len(content))
-    chunk = Chunk.read(ReadDataStream(BytesIO(content[at + HEAD_BYTES : end] + bytes(min(missing, 1)))))
+    added = bytes(min(missing, 1))  # where nothing of the data was written, the reader would raise an exception
+    chunk = Chunk.read(ReadDataStream(BytesIO(content[at + HEAD_BYTES : end] + added)))
     if not missing:
         return whole(chunk, max_bytes)
-    return begin(chunk.compression, content[end - _data_bytes(content, at) :], min(max_bytes, RECORD_BYTES))
-
-
-def _data_bytes(content: Content, at: int) -> int:
-    """Length of a chunk's compressed data."""
-    name = int.from_bytes(content[at + BEFORE_COMPRESSION : at + BEFORE_COMPRESSION + 4], "little")
-    return _length(content, at) - CHUNK_HEAD_BYTES - name
+    return begin(chunk.compression, chunk.data[:-1], min(max_bytes, RECORD_BYTES))
 
 
 _READERS: dict[int, Any] = {

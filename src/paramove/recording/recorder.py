@@ -43,6 +43,9 @@ class Recorder:
         path: Of the first part; see `paramove.recording.parts`.
         library: Name of the recording program, for the file's header.
 
+    Attributes:
+        part_name: Name of the file that was begun last; empty if the disk was full from the beginning.
+
     Raises OSError if it cannot be written for another reason than a full disk.
     """
 
@@ -57,7 +60,7 @@ class Recorder:
         self._is_low = False
         self._fault = ""
         self._part: RecordingWriter | None = None
-        self._part_name = ""
+        self.part_name = ""
         self._syncing: Future[None] | None = None
         self._is_synced = True
         self._sync_due_s = 0.0
@@ -71,11 +74,6 @@ class Recorder:
         self._threads = ThreadPoolExecutor(2, "recorder")
         self._running = self._threads.submit(self._run)
         self._running.add_done_callback(lambda _: self._wake())
-
-    @property
-    def part_name(self) -> str:
-        """Name of the file that was begun last; empty if the disk was full from the beginning."""
-        return self._part_name
 
     def keep(self, received: Received, message: Any = None) -> None:
         """Records a message. Never waits for a disk, but in lockstep.
@@ -180,7 +178,7 @@ class Recorder:
             self._part = None
         is_due = ends or time.monotonic() >= self._sync_due_s
         if is_due and self._lost:
-            self._log_loss(self._part_name, "the disk does not keep up", "now")
+            self._log_loss(self.part_name, "the disk does not keep up", "now")
         if self._syncing is not None and self._syncing.done():
             done, self._syncing = self._syncing, None
             done.result()
@@ -200,10 +198,10 @@ class Recorder:
             self._finish_part(self._part)
             self._part = None
         self._part = RecordingWriter(next_part(self._path), self._library)
-        self._part_name = self._part.path.name
+        self.part_name = self._part.path.name
         if self._fault:
             until = f"{self._waiting[0][1][3] * 1e-9:.3f} s" if self._waiting else "now"
-            self._log_loss(f"continues in {self._part_name}", self._fault, until)
+            self._log_loss(f"continues in {self.part_name}", self._fault, until)
         self._fault = ""
 
     def _finish_part(self, part: RecordingWriter) -> None:
@@ -223,7 +221,7 @@ class Recorder:
 
     def _handle_fault(self, error: OSError) -> None:
         if not self._fault:
-            _log.error("%s cannot be written: %s", self._part_name or self._path.name, error.strerror)
+            _log.error("%s cannot be written: %s", self.part_name or self._path.name, error.strerror)
         self._fault = error.strerror or str(error)
         self._wake()
 

@@ -144,7 +144,7 @@ class RecordingWriter:
             channel_id=channel, log_time=log_ns, publish_time=publish_ns, sequence=sequence % 2**32, data=data
         )
         self.unwritten += 1
-        if ends_chunk or self._stream.waiting >= CHUNK_BYTES:
+        if ends_chunk or len(self._stream.waiting) >= CHUNK_BYTES:
             self._stream.drain()
 
     def _channel(self, topic: str, message: Any) -> int:
@@ -167,31 +167,26 @@ class RecordingWriter:
 
 
 class _Stream:
-    """Buffer of the MCAP writer; `drain` writes it to the file and keeps what an error left."""
+    """Buffer of the MCAP writer; `drain` writes what is `waiting` to the file and keeps what an error left."""
 
     def __init__(self, file: FileIO) -> None:
         self._file = file
-        self._waiting = bytearray()
+        self.waiting = bytearray()
         self._begun = 0
 
-    @property
-    def waiting(self) -> int:
-        """Bytes that are not in the file yet."""
-        return len(self._waiting)
-
     def write(self, data: bytes) -> None:
-        self._waiting += data
+        self.waiting += data
 
     def tell(self) -> int:
-        return self._begun + len(self._waiting)
+        return self._begun + len(self.waiting)
 
     def flush(self) -> None:
         """Does nothing at the end of a chunk: an error here would lose the first message of the next."""
 
     def drain(self) -> None:
-        while self._waiting:
-            written = self._file.write(self._waiting)
-            del self._waiting[:written]
+        while self.waiting:
+            written = self._file.write(self.waiting)
+            del self.waiting[:written]
             self._begun += written
 
 
