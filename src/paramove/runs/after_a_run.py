@@ -65,6 +65,13 @@ def rounded(value: float) -> float | None:
     return round(float(value), 3) if np.isfinite(value) else None
 
 
+def write_report(folder: Path, page: str) -> Path:
+    """Writes `report.html` into a run's folder."""
+    path = folder / "report.html"
+    path.write_text(page, encoding="utf-8")
+    return path
+
+
 def write_run_json(folder: Path, summary: dict[str, Any]) -> Path:
     """Writes `run.json` into a run's folder: its numbers, the gaps of its recordings, and the workspace."""
     path = folder / "run.json"

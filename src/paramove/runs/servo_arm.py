@@ -22,7 +22,7 @@ from paramove.documents import Floats, InputError, film, image, read_document, r
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording import PartedRecording
 from paramove.robots import RobotDescription
-from paramove.runs.after_a_run import evaluated, verdict, write_run_json
+from paramove.runs.after_a_run import evaluated, verdict, write_report, write_run_json
 from paramove.runs.recorded_run import RunFolderError, robot_in
 
 REACHED_M, PLACED_M = 0.015, 0.010
@@ -138,12 +138,10 @@ def _write_report(folder: Path, robot: str, results: Sequence[TaskResult], pictu
         ),
         section("Paths", "Crosses are targets.", image(picture.read_bytes(), "paths of the hand and the objects")),
     ]  # fmt: skip
-    path = folder / "report.html"
     page = report_page(
         title, title, f"{good} of {len(results)} tasks done", parts, good=good == len(results), style="img{width:100%}"
     )
-    path.write_text(page, encoding="utf-8")
-    return path
+    return write_report(folder, page)
 
 
 def _places(state: TruthState) -> dict[str, Floats]:

@@ -12,6 +12,7 @@ from matplotlib.patches import Rectangle
 from paramove.demonstrations import table_place
 from paramove.documents import film, report_page, section
 from paramove.runs import plots
+from paramove.runs.after_a_run import write_report
 from paramove.runs.pointing.run import PointingRun
 
 TRUE, ESTIMATED = "#1d2530", "#2f9e57"
@@ -34,9 +35,7 @@ def write_pointing_report(run: PointingRun, summary: dict[str, Any], video: Path
         ),
         _how_sure(run),
     ]  # fmt: skip
-    path = run.folder / "report.html"
-    path.write_text(report_page(title, title, subtitle, parts, good=good), encoding="utf-8")
-    return path
+    return write_report(run.folder, report_page(title, title, subtitle, parts, good=good))
 
 
 def _how_sure(run: PointingRun) -> str:

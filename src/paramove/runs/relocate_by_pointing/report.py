@@ -15,6 +15,7 @@ from paramove.bus import topics
 from paramove.cameras import Frame, decode, encode
 from paramove.documents import film, image, report_page, section, table
 from paramove.runs import plots
+from paramove.runs.after_a_run import write_report
 from paramove.runs.pointing.video import drawn
 from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.relocate_by_pointing.run import GOAL, SCALE, PointedRelocation
@@ -46,9 +47,7 @@ def write_relocation_report(
             for one in relocations
         ),
     ]  # fmt: skip
-    path = run.folder / "report.html"
-    path.write_text(report_page(title, title, subtitle, parts, good=good, style="img{width:100%}"), encoding="utf-8")
-    return path
+    return write_report(run.folder, report_page(title, title, subtitle, parts, good=good, style="img{width:100%}"))
 
 
 def plan(relocations: list[PointedRelocation], figure: Figure) -> None:

@@ -15,7 +15,7 @@ from rich.console import Console
 
 from paramove.documents import replacing
 from paramove.robots import RobotDescription
-from paramove.runs.after_a_run import evaluated
+from paramove.runs.after_a_run import evaluated, write_report
 from paramove.runs.recorded_run import load_run
 from paramove.runs.rule_learning.summary import RunEvaluation, as_json
 from paramove.runs.verdict_table import show_verdict
@@ -39,11 +39,11 @@ def _evaluate(options: argparse.Namespace, console: Console) -> tuple[bool, list
         unfinished.write_text(as_json(evaluation.summary), encoding="utf-8")
     report = video = None
     if not options.no_report:
-        from paramove.runs.rule_learning.report import write_report
+        from paramove.runs.rule_learning.report import page
         from paramove.runs.rule_learning.video import write_video
 
         video = None if options.no_video else write_video(evaluation, console)
-        report = write_report(evaluation, video)
+        report = write_report(run.folder, page(evaluation, video))
     show_verdict(evaluation.summary, console)
     return evaluation.summary["success"], [report, video, numbers]
 

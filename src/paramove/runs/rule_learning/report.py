@@ -15,13 +15,6 @@ from paramove.runs.rule_learning.summary import RunEvaluation
 from paramove.runs.verdict_table import percent, rows_of
 
 
-def write_report(evaluation: RunEvaluation, video: Path | None) -> Path:
-    """Write `report.html` into the run's folder; the video is put into it."""
-    path = evaluation.run.folder / "report.html"
-    path.write_text(page(evaluation, video), encoding="utf-8")
-    return path
-
-
 def page(evaluation: RunEvaluation, video: Path | None) -> str:
     """The report as text."""
     summary = evaluation.summary
