@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from paramove.bus import topics
-from paramove.bus.recorded import Published, RecordedBus, with_ticks
+from paramove.bus.recorded import RecordedBus, with_ticks
 from paramove.bus.subscriber import Received
 from paramove.bus.ticks import Tick
 from paramove.msgs.gesture_pb2 import Gesture
@@ -23,7 +23,7 @@ def test_events_in_order_and_time_follows_them() -> None:
         seen.append((type(event).__name__, bus.now_ns))
         bus.publish(topics.SPEECH, Speech(text=str(bus.now_ns)))
     assert seen == [("Received", 3), ("Tick", 5), ("Received", 7), ("Tick", 10)]
-    assert bus.published[1] == Published(topics.SPEECH, Speech(text="5"), 5, 5)
+    assert bus.published[1] == Received(topics.SPEECH, Speech(text="5"), 5, 5, 2)
     assert len(bus.published_on(topics.SPEECH)) == 4
     assert bus.published_on(topics.GESTURES) == []
 

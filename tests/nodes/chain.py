@@ -11,7 +11,7 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from nodes import action_tracker, camera, recognizer
 from paramove.bus import topics
-from paramove.bus.recorded import Published, RecordedBus, with_ticks
+from paramove.bus.recorded import RecordedBus, with_ticks
 from paramove.bus.subscriber import Received
 
 Image = np.ndarray
@@ -34,7 +34,7 @@ def image_raw(image: Image, time_ns: int) -> RawImage:
     return message
 
 
-def heard(said: Sequence[Published], topic: topics.Topic) -> Iterator[Received]:
+def heard(said: Sequence[Received], topic: topics.Topic) -> Iterator[Received]:
     """What was said, as the next process hears it."""
     for number, one in enumerate(said, start=1):
         yield Received(topic, one.message, one.captured_ns, one.captured_ns, number)

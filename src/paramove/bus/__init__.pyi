@@ -5,7 +5,6 @@ from .budget import RateBudget as RateBudget
 from .bus import Bus as Bus
 from .endpoint import BusFolderError as BusFolderError
 from .endpoint import TopicTakenError as TopicTakenError
-from .endpoint import can_read as can_read
 from .endpoint import is_alive as is_alive
 from .endpoint import owner_of as owner_of
 from .endpoint import socket_path as socket_path
@@ -27,6 +26,7 @@ from .lockstep import to_marks as to_marks
 from .log_format import is_logged as is_logged
 from .log_format import parse as parse
 from .monitor import ForeignConnections as ForeignConnections
+from .monitor import can_read as can_read
 from .node import NodeConfig as NodeConfig
 from .node import main as main
 from .node import publish_each as publish_each

@@ -19,10 +19,10 @@ from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 
 from paramove.bus import topics
 from paramove.bus.bus import Bus
-from paramove.bus.endpoint import can_read
 from paramove.bus.envelope import Reason, RejectedError, unpack
 from paramove.bus.lockstep import answers_socket, from_marks, member_mark, to_marks
 from paramove.bus.log_format import is_logged
+from paramove.bus.monitor import can_read
 from paramove.bus.schemas import schema_hash
 from paramove.bus.subscriber import Received
 from paramove.bus.ticks import TICK_PERIOD_NS

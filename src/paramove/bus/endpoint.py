@@ -10,13 +10,14 @@ import fcntl
 import os
 import socket
 import stat
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import zmq
 
-_EVENTS = int(zmq.EVENTS)
+from paramove.bus.monitor import ForeignConnections
 
 PATH_BYTES = 107
 """Longest path of a Unix socket on Linux."""
@@ -128,6 +129,32 @@ class Ownership:
         self.release()
 
 
+def bound_socket(
+    context: zmq.Context[Any], kind: int, folder: Path, name: str, holder: str, options: Mapping[zmq.SocketOption, int]
+) -> tuple[zmq.Socket[Any], Ownership, ForeignConnections]:
+    """A socket at the path of a topic or service, which no other process may have.
+
+    Args:
+        context: Of ZeroMQ; the ownership may be released only after it was terminated.
+        kind: Of socket.
+        folder: Bus folder.
+        name: Of the topic or service.
+        holder: Name of the node, for the error that a second process gets.
+        options: Options of the socket and their values.
+
+    Raises:
+        TopicTakenError, BusFolderError: see `Ownership`.
+    """
+    path = socket_path(folder, name)
+    ownership = Ownership(path, holder)
+    socket: zmq.Socket[Any] = context.socket(kind)
+    for option, value in options.items():
+        socket.setsockopt(option, value)
+    foreign = ForeignConnections(socket, name)
+    socket.bind(f"ipc://{path}")
+    return socket, ownership, foreign
+
+
 def _check_free(path: Path) -> None:
     """Raises BusFolderError if there is anything at `path` but a socket of ours that no process listens on."""
     try:
@@ -153,8 +180,3 @@ def is_alive(path: Path) -> bool:
         except OSError:
             return False
     return True
-
-
-def can_read(socket: zmq.Socket[Any]) -> bool:
-    """Whether a message is waiting. Cheaper than to receive and catch `zmq.Again`."""
-    return bool(socket.getsockopt(_EVENTS) & 1)  # type: ignore[operator]  # POLLIN; enums would cost more

@@ -17,6 +17,7 @@ import zmq
 from paramove.bus import topics
 from paramove.bus.endpoint import holder_of, is_held, socket_path
 from paramove.bus.publisher import Publisher
+from paramove.bus.sequence import SequenceCounter
 from paramove.bus.subscriber import Received, Subscriber
 from paramove.bus.topics import Topic
 
@@ -79,23 +80,14 @@ class Measurement:
 
     Attributes:
         topic: Row of the table.
-        welcomed: Whether the publisher answered.
-        messages: How many were received; a latched value that was published before counts, too.
-        lost: Gaps in the sequence.
-        rejected: Messages that were rejected.
-        sequence: Of the latest message of the publisher.
-        epoch: Of the publisher.
+        counter: Of the messages, losses and rejected messages; a latched value that was published before counts, too.
+            Its epoch is None if no publisher answered.
         bytes_total: Of the payloads.
         arrivals_s: When messages arrived.
     """
 
     topic: Topic
-    welcomed: bool = False
-    messages: int = 0
-    lost: int = 0
-    rejected: int = 0
-    sequence: int = 0
-    epoch: int = 0
+    counter: SequenceCounter
     bytes_total: int = 0
     arrivals_s: list[float] = field(default_factory=list)
 
@@ -114,7 +106,7 @@ class Measurement:
     @property
     def mean_bytes(self) -> float:
         """Mean size of a payload."""
-        return self.bytes_total / self.messages if self.messages else 0.0
+        return self.bytes_total / self.counter.messages if self.counter.messages else 0.0
 
 
 def publishers(folder: Path) -> list[PublisherOnBus]:
@@ -145,21 +137,15 @@ def listen(folder: Path, selected: Sequence[Topic], seconds: float) -> Iterator[
 def measure(folder: Path, selected: Sequence[Topic], seconds: float) -> list[Measurement]:
     """Counts what is published on the topics for `seconds`, reading envelopes only: payloads are not decoded."""
     end_s = time.monotonic() + seconds
-    measurements = [Measurement(topic) for topic in selected]
     with BusVisitor(folder) as visitor:
         subscribers = [visitor.subscriber(topic) for topic in selected]
+        measurements = [Measurement(subscriber.topic, subscriber.counter) for subscriber in subscribers]
         while time.monotonic() < end_s:
             for subscriber, measurement in zip(subscribers, measurements, strict=True):
                 while (raw := subscriber.receive_raw()) is not None:
                     measurement.arrivals_s.append(time.monotonic())
                     measurement.bytes_total += len(raw[1])
             _poll(subscribers, end_s)
-        for subscriber, measurement in zip(subscribers, measurements, strict=True):
-            counter = subscriber.counter
-            measurement.welcomed = subscriber.welcomed
-            measurement.messages, measurement.lost = counter.messages, counter.lost
-            measurement.sequence, measurement.epoch = counter.sequence, counter.epoch or 0
-            measurement.rejected = counter.rejected.total()
     return measurements
 
 

@@ -23,7 +23,7 @@ from typing import Any
 import zmq
 
 from paramove.bus import topics
-from paramove.bus.endpoint import Ownership, socket_path
+from paramove.bus.endpoint import Ownership, bound_socket, socket_path
 from paramove.bus.envelope import Envelope, pack, publisher_id
 from paramove.bus.exchange import Exchange, Marks
 from paramove.bus.monitor import ForeignConnections
@@ -95,15 +95,12 @@ def answers_socket(
         holder: Name of the node.
         max_bytes: Of an answer.
     """
-    path = socket_path(folder, SERVICE)
-    ownership = Ownership(path, holder)
-    socket: zmq.Socket[Any] = context.socket(zmq.ROUTER)
-    socket.setsockopt(zmq.ROUTER_HANDOVER, 1)  # a restarted member comes with the name of the dead one
-    socket.setsockopt(zmq.LINGER, 0)
-    socket.setsockopt(zmq.MAXMSGSIZE, max_bytes)
-    foreign = ForeignConnections(socket, SERVICE)
-    socket.bind(f"ipc://{path}")
-    return socket, ownership, foreign
+    options = {
+        zmq.ROUTER_HANDOVER: 1,  # a restarted member comes with the name of the dead one
+        zmq.LINGER: 0,
+        zmq.MAXMSGSIZE: max_bytes,
+    }
+    return bound_socket(context, zmq.ROUTER, folder, SERVICE, holder, options)
 
 
 def member_socket(context: zmq.Context[Any], folder: Path, node: str) -> zmq.Socket[Any]:
@@ -172,10 +169,8 @@ class LockstepTicks:
             self._exchange.wait(LONGEST_WAIT_S)
 
     def _next_clock(self) -> Clock | None:
+        self._exchange.drain([topics.CLOCK.name])
         clock = self._exchange.pop(topics.CLOCK)
-        if clock is None:
-            self._exchange.drain([topics.CLOCK.name])
-            clock = self._exchange.pop(topics.CLOCK)
         if clock is None:
             self._exchange.wait(LONGEST_WAIT_S)
             return None

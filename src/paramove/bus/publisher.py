@@ -9,10 +9,10 @@ from typing import Any
 
 import zmq
 
-from paramove.bus.endpoint import Ownership, can_read, prepare_folder, socket_path
+from paramove.bus.endpoint import bound_socket, prepare_folder
 from paramove.bus.envelope import FLAG_LAST_VALUE, FLAG_RING, FLAG_WELCOME, Envelope, pack, publisher_id
 from paramove.bus.image_ring import SMALLEST, RingWriter
-from paramove.bus.monitor import ForeignConnections
+from paramove.bus.monitor import can_read
 from paramove.bus.schemas import schema_hash
 from paramove.bus.topics import Profile, Topic
 
@@ -57,21 +57,18 @@ class Publisher:
         self.sequence = 0
         self.subscriptions = 0
         prepare_folder(folder)
-        path = socket_path(folder, self.name)
-        self.ownership = Ownership(path, node)
         self._frame = self.name.encode() + b"\0"
         self._schema = schema_hash(topic.type)
         self._publisher = publisher_id(node)
         self._last: tuple[Envelope, bytes] | None = None
         self._ring = RingWriter() if topic.by_ring else None
-        self.socket: zmq.Socket[Any] = context.socket(zmq.XPUB)
-        self.socket.setsockopt(zmq.XPUB_VERBOSE, 1)
-        self.socket.setsockopt(zmq.SNDHWM, topic.publisher_high_water_mark)
-        self.socket.setsockopt(zmq.LINGER, LINGER_MS)
-        # A subscriber sends subscriptions only.
-        self.socket.setsockopt(zmq.MAXMSGSIZE, 1024)
-        self.foreign = ForeignConnections(self.socket, self.name)
-        self.socket.bind(f"ipc://{path}")
+        options = {
+            zmq.XPUB_VERBOSE: 1,
+            zmq.SNDHWM: topic.publisher_high_water_mark,
+            zmq.LINGER: LINGER_MS,
+            zmq.MAXMSGSIZE: 1024,  # a subscriber sends subscriptions only
+        }
+        self.socket, self.ownership, self.foreign = bound_socket(context, zmq.XPUB, folder, self.name, node, options)
 
     def publish(self, message: Any, captured_ns: int, now_ns: int) -> int:
         """Publishes `message` and returns its sequence number. Never waits.

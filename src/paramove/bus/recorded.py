@@ -7,8 +7,8 @@ assert [published.message for published in bus.published_on(topics.OBJECTS_TRACK
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +18,6 @@ from paramove.bus.subscriber import Received
 from paramove.bus.ticks import TICK_PERIOD_NS, Tick
 from paramove.bus.topics import Topic
 from paramove.documents import renamed_attribute
-
-
-@dataclass(frozen=True)
-class Published:
-    """One message that the node published."""
-
-    topic: Topic
-    message: Any
-    captured_ns: int
-    published_ns: int
 
 
 def with_ticks(messages: Iterable[Received], period_ns: int = TICK_PERIOD_NS) -> Iterator[Received | Tick]:
@@ -58,7 +48,7 @@ class RecordedBus:
         protected: Reject messages with unsound numbers, as the bus does; they are listed in `rejected`.
 
     Attributes:
-        published: Everything the node published, in order.
+        published: Everything the node published, in order, as a subscriber receives it.
         states: States and their messages in order, such as ("ready", "tracking 4 colours").
         rejected: Topic and unsound number of each message that was rejected.
         now_ns: Publish time of the latest message or time of the latest tick.
@@ -74,13 +64,14 @@ class RecordedBus:
         self.node = node
         self.run_folder = run_folder or Path()
         self.settings = BusSettings(folder=self.run_folder, clock="simulated")
-        self.published: list[Published] = []
+        self.published: list[Received] = []
         self.states: list[tuple[str, str]] = []
         self.rejected: list[tuple[str, str]] = []
         self.now_ns = 0
         self.stopped = False
         self._protected = protected
         self._waiting = list(recorded)
+        self._sequences: Counter[str] = Counter()
 
     def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
         """Stores a copy of the message; raises TypeError if the topic carries another type."""
@@ -88,9 +79,11 @@ class RecordedBus:
             raise TypeError(f"topic {topic.name} carries {topic.type_name}, not {type(message).__name__}")
         copy = topic.type()
         copy.CopyFrom(message)
-        self.published.append(Published(topic, copy, self.now_ns if captured_ns is None else captured_ns, self.now_ns))
+        self._sequences[topic.name] += 1
+        captured_ns = self.now_ns if captured_ns is None else captured_ns
+        self.published.append(Received(topic, copy, captured_ns, self.now_ns, self._sequences[topic.name]))
 
-    def published_on(self, topic: Topic) -> list[Published]:
+    def published_on(self, topic: Topic) -> list[Received]:
         """What the node published on one topic."""
         return [one for one in self.published if one.topic.name == topic.name]
 

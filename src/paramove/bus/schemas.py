@@ -22,13 +22,13 @@ Counts for the type that stands in the topic table, also if the change was in a 
 """
 
 
-@cache
 def schema_hash(message_type: type[Any]) -> int:
     """First 64 bits (little-endian) of SHA-256 over "<full name> <generation>"."""
     name = str(message_type.DESCRIPTOR.full_name)
     return hash_of(name, GENERATIONS.get(name, 1))
 
 
+@cache
 def hash_of(name: str, generation: int) -> int:
     """The number of one generation of a message type."""
     return int.from_bytes(hashlib.sha256(f"{name} {generation}".encode()).digest()[:8], "little")

@@ -12,11 +12,11 @@ import zmq
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 
 from paramove.bus.budget import ALLOWANCE, BURST, RateBudget
-from paramove.bus.endpoint import can_read, holder_of, socket_path
+from paramove.bus.endpoint import holder_of, socket_path
 from paramove.bus.envelope import FLAG_RING, SIZE, Envelope, Reason, RejectedError, unpack
 from paramove.bus.image_ring import OverwrittenError, RingReader
 from paramove.bus.log_format import is_logged
-from paramove.bus.monitor import Monitor
+from paramove.bus.monitor import Monitor, can_read
 from paramove.bus.schemas import schema_hash
 from paramove.bus.sequence import Arrival, SequenceCounter
 from paramove.bus.soundness import unsound

@@ -57,7 +57,8 @@ def info(name: NameArgument, domain: DomainOption = None, as_json: JsonOption = 
     }
     if publisher.alive:
         (measured,) = inspection.measure(folder, [topic], wait_s)
-        row |= {"answers": measured.welcomed, "epoch": measured.epoch, "published": measured.sequence}
+        counter = measured.counter
+        row |= {"answers": counter.epoch is not None, "epoch": counter.epoch or 0, "published": counter.sequence}
     if as_json:
         typer.echo(json.dumps(with_old_keys(row), indent=2))
     else:
@@ -115,12 +116,12 @@ def hz(
             "topic": item.topic.name,
             "rate_hz": round(item.rate_hz, 2),
             "nominal_hz": item.topic.rate_hz,
-            "messages": item.messages,
-            "lost": item.lost,
-            "refused": item.rejected,
+            "messages": item.counter.messages,
+            "lost": item.counter.lost,
+            "refused": item.counter.rejected.total(),
             "longest_gap_s": round(item.longest_gap_s, 4),
             "mean_bytes": round(item.mean_bytes),
-            "state": _state(item.topic.name in alive, item.welcomed),
+            "state": _state(item.topic.name in alive, item.counter.epoch is not None),
         }
         for item in inspection.measure(folder, requested, seconds)
     ]
