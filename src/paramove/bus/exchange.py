@@ -51,7 +51,7 @@ class Exchange:
         self._poller = zmq.Poller()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._poller.register(self._wake, zmq.POLLIN)
-        self._others: list[zmq.Socket[Any]] = []
+        self._others: list[zmq.Socket[Any] | ForeignConnections] = []
         self._foreign: list[ForeignConnections] = []
         self._pid = os.getpid()
         self._watch_due_s = 0.0
@@ -85,9 +85,10 @@ class Exchange:
         foreign: ForeignConnections | None = None,
     ) -> None:
         """Lets `wait` return when `socket` can be read; it is closed with the others."""
-        self._others.append(socket)
         if foreign is not None:
             self._foreign.append(foreign)
+            self._others.append(foreign)
+        self._others.append(socket)
         self._poller.register(socket, zmq.POLLIN)
         if ownership is not None:
             self._owned.append(ownership)
@@ -150,11 +151,11 @@ class Exchange:
         for name in topics:
             pending, subscriber = self._pending[name], self.subscribers[name]
             mark = marks.get(subscriber.name) if marks else None
+            present = subscriber.counter.epoch
             while pending:
                 epoch, received = pending[0]
-                present = epoch == subscriber.counter.epoch
                 # Of the present publisher and published after the mark, or by a new start of it that has no mark yet.
-                if mark is not None and present and (epoch != mark[0] or received.sequence > mark[1]):
+                if mark is not None and epoch == present and (epoch != mark[0] or received.sequence > mark[1]):
                     break
                 taken.append(received)
                 pending.popleft()
@@ -203,14 +204,8 @@ class Exchange:
         self.stopped = self._closed = True
         if os.getpid() != self._pid:
             return  # a fork: the sockets and the thread behind them are the parent's
-        for subscriber in self.subscribers.values():
-            subscriber.close()
-        for publisher in self.publishers.values():
-            publisher.close()
-        for foreign in self._foreign:
-            foreign.close()
-        for socket in self._others:
-            socket.close()
+        for item in (*self.subscribers.values(), *self.publishers.values(), *self._others):
+            item.close()
         self.context.term()
         # Only now are the sockets' files gone: a successor that binds earlier would lose its own to libzmq's clean-up.
         for ownership in self._owned:

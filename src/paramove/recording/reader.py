@@ -54,23 +54,17 @@ def read(path: Path, only: Collection[str] = (), raising: type[InputError] = Inp
         InputError: A message is not of its topic's type, or too large.
         KeyError: The file has a topic that is not in the topic table.
     """
-    types: dict[int, Any] = {}
-    names: dict[int, str] = {}
+    channels: dict[int, topics.Topic] = {}
     with path.open("rb") as file:
         for record in _records(file, path.stat().st_size):
             if isinstance(record, Channel):
                 name = topics.OLD_NAMES.get(record.topic, record.topic)
                 if not only or name in only or record.topic in only:
-                    types[record.id], names[record.id] = topics.by_name(name).type, name
-            elif isinstance(record, Message) and record.channel_id in types:
-                topic = names[record.channel_id]
-                yield Recorded(
-                    topic,
-                    _decoded(path, types[record.channel_id], topic, record, raising),
-                    record.log_time,
-                    record.publish_time,
-                    record.sequence,
-                )
+                    channels[record.id] = topics.by_name(name)
+            elif isinstance(record, Message) and record.channel_id in channels:
+                topic = channels[record.channel_id]
+                message = _decoded(path, topic, record, raising)
+                yield Recorded(topic.name, message, record.log_time, record.publish_time, record.sequence)
 
 
 def _records(file: IO[bytes], size: int) -> Iterator[McapRecord]:
@@ -87,16 +81,15 @@ def _records(file: IO[bytes], size: int) -> Iterator[McapRecord]:
                 yield record
 
 
-def _decoded(path: Path, message_type: Any, topic: str, message: Message, raising: type[InputError]) -> Any:
+def _decoded(path: Path, topic: topics.Topic, message: Message, raising: type[InputError]) -> Any:
     """Decodes a message. The simulator's view is stored as JPEG, everything else as published."""
-    if topic == topics.TRUTH_VIEW.name:
-        message_type = topics.CAMERA_IMAGE.type
+    message_type = topics.CAMERA_IMAGE.type if topic is topics.TRUTH_VIEW else topic.type
     try:
         if len(message.data) > MESSAGE_BYTES:
             raise ValueError(f"{len(message.data)} bytes, at most {MESSAGE_BYTES} are read")
         return message_type.FromString(message.data)
     except (DecodeError, ValueError) as error:
         raise raising(
-            f"{path}: message {message.sequence} on {topic} is not a {message_type.DESCRIPTOR.full_name} ({error}); "
-            "another program recorded it, or it is damaged: record it again"
+            f"{path}: message {message.sequence} on {topic.name} is not a {message_type.DESCRIPTOR.full_name} "
+            f"({error}); another program recorded it, or it is damaged: record it again"
         ) from error
