@@ -99,7 +99,8 @@ def test_the_guard_kills_before_it_prints(workspace, stuck):
 
 def test_what_judges_the_run_does_not_wait_either(workspace, stuck):
     judge = "import argparse, sys\nfrom paramove.runs.after_a_run import evaluated\n\n\n"
-    judge += "sys.exit(evaluated('nodes.judge', '', {}, lambda options, console: (not console.print('x' * 10_000), []), None))"
+    judge += "def judged(options, console):\n    console.print('x' * 10_000)\n    return True, []\n\n\n"
+    judge += "sys.exit(evaluated('nodes.judge', '', {}, judged, None))\n"
     (workspace.root / "nodes" / "judge.py").write_text(judge)
     workspace.write(
         "after_run: nodes.judge\n"
