@@ -45,7 +45,7 @@ from paramove.runs.video import (
 COLOURS: dict[str, Colour] = {"yellow": (255, 205, 40), "green": (70, 205, 95), "blue": (95, 140, 255)}
 HAND: Colour = (255, 80, 190)
 STAGES = ("calibrate", "learn", "apply")
-CAMERA_HZ = 15.0
+CAMERA, CAMERA_HZ = topics.CAMERA_IMAGE.name, 15.0
 LONG_RUN_S = 400.0
 """A longer run is displayed four times as fast as it was, others twice."""
 GESTURE_DISPLAYED_S = 1.5
@@ -74,8 +74,8 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
     title, steady = run.title("rule learning"), SteadyImage()
     path = run.folder / "demo.mp4"
     with replacing(path) as unfinished, VideoWriter(unfinished) as writer:
-        pairs = views_with(run, {topics.CAMERA_IMAGE.name}, attrgetter("log_ns"))
-        displayed = ((view, *latest.values()) for view, latest in islice(pairs, 0, None, every) if latest)
+        pairs = views_with(run, {CAMERA}, attrgetter("log_ns"))
+        displayed = ((view, latest[CAMERA]) for view, latest in islice(pairs, 0, None, every) if CAMERA in latest)
         count = len(range(0, number, every))
         picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         for view, image in track(islice(displayed, count), "video", count, console=console, transient=True):
