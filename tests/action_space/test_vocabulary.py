@@ -9,7 +9,6 @@ from paramove.action_space.training import train_action
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
 from paramove.demonstrations import Demonstrations, table_place
 from paramove.documents.input_error import InputError
-from paramove.hmm import at_progress
 from paramove.phmm import LinearPHMM
 from tests.action_space.toy import toy_action
 
@@ -25,7 +24,7 @@ def draws(action, n=25, seed=0):
 
 def test_mean_poses_are_those_of_the_model(pointing):
     theta, tau, _ = draws(pointing)
-    expected = [at_progress(pointing.model.state_means(one), at) for one, at in zip(theta, tau, strict=True)]
+    expected = [pointing.model.progress_mean(one, at) for one, at in zip(theta, tau, strict=True)]
     np.testing.assert_allclose(pointing.poses(theta, tau), expected, atol=1e-9)
 
 

@@ -339,6 +339,10 @@ class ParametricHMM(ABC):
         frames = np.maximum(2, np.round(np.exp(logarithms))).astype(np.int64)
         return frames if frames.ndim else int(frames)
 
+    def progress_mean(self, theta: ArrayLike, tau: float | Floats) -> Floats:
+        """Mean pose for theta (P,) at progress tau in [0, 1] (6.2). Shape tau.shape + (D,)."""
+        return at_progress(self.state_means(theta), tau)
+
     def progress_covariance(self, theta: ArrayLike, tau: float | Floats) -> Floats:
         """Covariance of the pose for theta (P,) at progress tau in [0, 1] (6.3). Shape tau.shape + (D, D)."""
         return at_progress(self.at(theta).covariances_, tau)
