@@ -74,7 +74,7 @@ def test_estimate_is_the_maximum_of_a_dense_raster(model: InterpolativePHMM) -> 
     assert model.estimate(sequence).log_likelihood >= max(model.log_likelihood(sequence, one) for one in raster) - 1e-3
 
 
-def test_covariances_at_a_progress_lie_between_those_of_the_states(model: InterpolativePHMM) -> None:
+def test_poses_and_covariances_at_a_progress_lie_between_those_of_the_states(model: InterpolativePHMM) -> None:
     rng = np.random.default_rng(4)
     theta, tau = rng.uniform(-0.5, 0.5, (30, 2)), rng.uniform(0.0, 1.0, 30)
     tau[:2] = 0.0, 1.0
@@ -82,6 +82,8 @@ def test_covariances_at_a_progress_lie_between_those_of_the_states(model: Interp
         hmm, position = model.at(theta[number]), tau[number] * 19
         low, high, share = int(np.floor(position)), int(np.ceil(position)), position - np.floor(position)
         spread = (1 - share) * hmm.covariances_[low] + share * hmm.covariances_[high]
+        pose = (1 - share) * hmm.means_[low] + share * hmm.means_[high]
+        assert_allclose(model.progress_mean(theta[number], tau)[number], pose, rtol=0.0, atol=1e-12)
         covariance = model.progress_covariance(theta[number], tau[number])
         assert_allclose(covariance, spread, rtol=0.0, atol=1e-12)
         assert_allclose(model.progress_covariance(theta[number], tau)[number], spread, rtol=0.0, atol=1e-12)
