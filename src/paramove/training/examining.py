@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -193,10 +192,12 @@ def percent(probability: float) -> str:
 
 def confusion(recognitions: Sequence[Recognition]) -> dict[str, dict[str, int]]:
     """Labelled action -> recognised action -> count; "none" where the movement was rejected."""
-    table: dict[str, dict[str, int]] = defaultdict(Counter)
+    table: dict[str, dict[str, int]] = {}
     for one in recognitions:
         if one.movement.action:
-            table[one.movement.action][one.action if one.known else "none"] += 1
+            row = table.setdefault(one.movement.action, {})
+            recognised = one.action if one.known else "none"
+            row[recognised] = row.get(recognised, 0) + 1
     return table
 
 
