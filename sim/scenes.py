@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+from paramove.motion import check_model
 from paramove.robots import RobotDescription
 from paramove.robots.dynamixel import PACING_SOCKET
 from sim import looks, tool_box
@@ -41,11 +42,12 @@ def build(
         firmware_log: Gets every frame that the robot's firmware plays, 28 little-endian int16 a millisecond.
         lockstep: Whether the run is in lockstep.
     """
-    if options.scene == "servo_arm":
-        robot = RobotDescription.load(options.robot)
-        return ServoArmWorld(robot, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed)
     if options.scene == "pointing":
         return PointingWorld(options.seed, options.targets, options.views, options.markers)
+    robot = RobotDescription.load(options.robot)
+    check_model(robot)
+    if options.scene == "servo_arm":
+        return ServoArmWorld(robot, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed)
     return at_the_tool_box(options, run_folder, bus_folder, firmware_log, lockstep)
 
 

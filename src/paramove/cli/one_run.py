@@ -77,6 +77,7 @@ def run(
             launch = load(workspace, name, overlays, settings, seed, headless, robot)
             if check_only:
                 application.check(launch, workspace)
+                _check_robots(launch)
                 console.print("\n".join(_found(launch, environment, workspace)), soft_wrap=True)
                 return exit_codes.OK
             with tempfile.TemporaryDirectory() as set_up:
@@ -166,6 +167,16 @@ def _left_out(launch: Launch) -> str:
     """Overlays that the launch file has by default, if none of them was chosen."""
     default = launch.file.default_overlays
     return "" if set(default) & set(launch.overlays) else " --with ".join(default)
+
+
+def _check_robots(launch: Launch) -> None:
+    """Compares the robots that the nodes drive or simulate with their models. Raises DescriptionError."""
+    from paramove.motion import check_model
+    from paramove.robots import RobotDescription
+
+    folders = {node.parameters["robot"] for node in launch.file.nodes.values() if "robot" in node.parameters}
+    for folder in sorted(folders):
+        check_model(RobotDescription.load(folder))
 
 
 def _found(launch: Launch, environment: Environment, workspace: Workspace) -> list[str]:

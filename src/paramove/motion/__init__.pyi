@@ -2,6 +2,7 @@ from .arm_pose import ArmPoseSolver as ArmPoseSolver
 from .clearance import SurfaceParameters as SurfaceParameters
 from .conversion import RobotMovement as RobotMovement
 from .gripper_arm import GripperArm as GripperArm
+from .model_check import check_model as check_model
 from .plans import FARTHEST_M as FARTHEST_M
 from .plans import MotionPlans as MotionPlans
 from .plans import NoPlanError as NoPlanError

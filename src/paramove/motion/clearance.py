@@ -70,12 +70,12 @@ class ClearanceChecker:
     """
 
     def __init__(self, robot: RobotDescription, arm: GripperArm, surface: SurfaceParameters) -> None:
+        check_model(robot)
         self.surface = surface
         try:
             self._model = model = _compiled(robot, surface)
         except ValueError as error:  # of MuJoCo
             raise DescriptionError(f"{robot.model_path} does not fit the robot's description: {error}") from error
-        check_model(robot, arm, model)
         self._data = data = mujoco.MjData(model)
         data.qpos[qpos_addresses(model, robot.joint_names)] = robot.base_pose
         self._qpos = qpos_addresses(model, arm.joints)

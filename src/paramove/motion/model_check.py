@@ -16,13 +16,23 @@ RANGE_TOLERANCE = np.deg2rad(1.0)
 N_POSES = 20
 
 
-def check_model(robot: RobotDescription, arm: GripperArm, model: mujoco.MjModel) -> None:
-    """Compares the description of an arm with the model in poses all over its range.
+def check_model(robot: RobotDescription) -> None:
+    """Compares the description of each arm with the robot's model, in poses all over its range.
 
     Raises:
-        DescriptionError: The model lacks a joint or a site, has a smaller range of a joint, or another position of the
-            end effector: wrong lengths would send a real arm elsewhere, and nothing on it would notice.
+        DescriptionError: MuJoCo rejects the model, or the model lacks a joint or a site, has a smaller range of a
+            joint, or another position of the end effector: wrong lengths would send a real arm elsewhere, and nothing
+            on it would notice.
     """
+    try:
+        model = mujoco.MjModel.from_xml_path(str(robot.model_path))
+    except ValueError as error:
+        raise DescriptionError(f"MuJoCo does not take {robot.model_path}: {error}") from error
+    for side in robot.arms or [""]:
+        _check_arm(robot, GripperArm.of(robot, side), model)
+
+
+def _check_arm(robot: RobotDescription, arm: GripperArm, model: mujoco.MjModel) -> None:
     for kind, names, known in (
         ("joint", robot.joint_names, [model.joint(i).name for i in range(model.njnt)]),
         ("site", (arm.base_site, arm.tip_site), [model.site(i).name for i in range(model.nsite)]),
