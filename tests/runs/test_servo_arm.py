@@ -49,6 +49,15 @@ def test_a_run_is_judged_by_its_truth_even_if_the_judge_was_started_again(folder
     assert "2 of 2 tasks done" in (folder / "report.html").read_text()
 
 
+def test_a_gap_counts_from_the_begin_of_the_run(folder: Path) -> None:
+    (folder / "run.yaml").write_text("begun_ns: 1\n")
+    record(folder, (0.2, 0.0, 0.104), 0.1)
+    record(folder, (0.1, 0.0, 0.104), 0.205)
+    assert servo_arm.main([str(folder), "--no-video"]) == 0
+    gap = {"recording": "truth", "begin_s": pytest.approx(0.0), "end_s": pytest.approx(1e-9)}
+    assert json.loads((folder / "run.json").read_text())["gaps"] == [gap]
+
+
 def test_without_room_for_the_numbers_the_reason_is_told_and_the_run_can_be_judged_later(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,7 +1,7 @@
 from .grammar import Grammar as Grammar
 from .grammar_file import parsed_grammar as parsed_grammar
 from .grammar_file import read_grammar as read_grammar
-from .messages import BALL_M as BALL_M
+from .messages import add_ball as add_ball
 from .messages import arm_pose_message as arm_pose_message
 from .messages import ball_colour as ball_colour
 from .messages import certainty as certainty

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
+from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
@@ -152,11 +153,16 @@ def scene_message(state: TrackedState, table: TablePose = AT_TABLE) -> SceneUpda
     """The estimated arm as lines and the ball where it points, in the frame of `table`."""
     arm = table.frame_from_table(state.estimate.pose[:9].reshape(3, 3))
     message = line_in_scene(state.captured_ns, "target", arm, table.frame)
-    ball = message.entities[0].spheres.add(color=opaque(ball_colour(certainty(state.pointed_deviation))))
-    ball.pose.position.x, ball.pose.position.y, ball.pose.position.z = table.frame_from_table(state.pointed)
+    add_ball(message.entities[0], table.frame_from_table(state.pointed), certainty(state.pointed_deviation))
+    return message
+
+
+def add_ball(entity: SceneEntity, position: Floats, certain: float) -> None:
+    """Adds the ball where an arm points, (3,), m: green where that is certain, red where it is not."""
+    ball = entity.spheres.add(color=opaque(ball_colour(certain)))
+    ball.pose.position.x, ball.pose.position.y, ball.pose.position.z = position
     ball.pose.orientation.w = 1.0
     ball.size.x = ball.size.y = ball.size.z = BALL_M
-    return message
 
 
 def _location(position: Floats, deviation: Floats, table: TablePose) -> Location:

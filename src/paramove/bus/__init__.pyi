@@ -38,6 +38,7 @@ from .sequence import SequenceCounter as SequenceCounter
 from .settings import BusSettings as BusSettings
 from .settings import default_folder as default_folder
 from .settings import lock_of as lock_of
+from .settings import nodes_in as nodes_in
 from .subscriber import Received as Received
 from .subscriber import Subscriber as Subscriber
 from .ticks import TICK_PERIOD_NS as TICK_PERIOD_NS

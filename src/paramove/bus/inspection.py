@@ -18,6 +18,7 @@ from paramove.bus import topics
 from paramove.bus.endpoint import holder_of, is_held, socket_path
 from paramove.bus.publisher import Publisher
 from paramove.bus.sequence import SequenceCounter
+from paramove.bus.settings import nodes_in
 from paramove.bus.subscriber import Received, Subscriber
 from paramove.bus.topics import Topic
 
@@ -111,9 +112,8 @@ class Measurement:
 
 def publishers(folder: Path) -> list[PublisherOnBus]:
     """Every topic of the table, and every status topic that was published in the folder."""
-    nodes = sorted(path.name.removeprefix("status.") for path in folder.glob("status.*") if path.suffix != ".lock")
     public = [topic for topic in topics.TOPICS if not topic.truth]
-    return [publisher_of(folder, topic) for topic in (*public, *(topics.status(node) for node in nodes))]
+    return [publisher_of(folder, topic) for topic in (*public, *map(topics.status, nodes_in(folder)))]
 
 
 def publisher_of(folder: Path, topic: Topic) -> PublisherOnBus:

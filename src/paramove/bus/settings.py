@@ -25,6 +25,11 @@ def default_folder(domain: str | None = None) -> Path:
     return Path(tempfile.gettempdir()) / f"paramove-{os.getuid()}" / domain
 
 
+def nodes_in(folder: Path) -> list[str]:
+    """Nodes that publish, or have published, a status in a bus folder."""
+    return sorted(path.name.removeprefix("status.") for path in folder.glob("status.*") if path.suffix != ".lock")
+
+
 def lock_of(folder: Path) -> Path:
     """Lock file that the launcher of a run holds for its bus folder."""
     return folder.with_name(f"{folder.name}.lock")

@@ -78,11 +78,10 @@ def typed_words(environment: Mapping[str, str]) -> list[str]:
 
 def nodes() -> list[str]:
     """Nodes that are, or were, on the bus."""
-    from paramove.bus import default_folder
+    from paramove.bus import default_folder, nodes_in
 
     with contextlib.suppress(OSError):
-        sockets = [path for path in default_folder().glob("status.*") if path.suffix != ".lock"]
-        return sorted(path.name.removeprefix("status.") for path in sockets)
+        return nodes_in(default_folder())
     return []
 
 

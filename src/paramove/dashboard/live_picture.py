@@ -13,7 +13,7 @@ from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 from foxglove_schemas_protobuf.PointsAnnotation_pb2 import PointsAnnotation
 from pydantic import BaseModel, ConfigDict
 
-from paramove.bus import Bus, Received, topics
+from paramove.bus import Bus, Received, nodes_in, topics
 from paramove.dashboard.estimates import Estimates
 from paramove.dashboard.robot_shape import RobotShape, rounded
 from paramove.msgs.node_status_pb2 import NodeStatus
@@ -23,9 +23,8 @@ from paramove.robots import RobotDescription
 
 def subscribe_to_nodes(bus: Bus) -> None:
     """Subscribes to the status of every node that has published one in the bus's folder."""
-    for path in bus.settings.folder.glob("status.*"):
-        if path.suffix != ".lock":
-            bus.subscribe(topics.status(path.name.removeprefix("status.")))
+    for node in nodes_in(bus.settings.folder):
+        bus.subscribe(topics.status(node))
 
 
 @dataclass

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from paramove.action_space import BALL_M, PersonPlacement, ball_colour, certainty
+from paramove.action_space import PersonPlacement, add_ball, certainty
 from paramove.cameras import WORLD_FRAME
 from paramove.demonstrations import FRAMES, at_times, table_place
 from paramove.documents import Floats, InputError
@@ -119,12 +119,7 @@ class PointingWindow:
         entity = message.entities.add(id="pointed_at", frame_id=WORLD_FRAME)
         entity.timestamp.FromNanoseconds(self.estimate.captured_ns)
         entity.lifetime.FromMilliseconds(1000)
-        ball = entity.spheres.add()
-        ball.pose.position.x, ball.pose.position.y, ball.pose.position.z = self.estimate.position
-        ball.pose.orientation.w = 1.0
-        ball.size.x = ball.size.y = ball.size.z = BALL_M
-        ball.color.r, ball.color.g, ball.color.b = ball_colour(self.estimate.likeness)
-        ball.color.a = 1.0
+        add_ball(entity, self.estimate.position, self.estimate.likeness)
         return message
 
     def _sample(self, pose: ArmPose) -> Floats | None:

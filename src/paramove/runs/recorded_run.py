@@ -188,8 +188,9 @@ def load_run(folder: Path) -> RecordedRun:
 
 
 def gaps_in(folder: Path) -> tuple[RecordingGap, ...]:
-    """The gaps of all recordings of a run, which has them only where there are further parts."""
-    recordings = {name: PartedRecording(folder / f"{name}.mcap") for name in ("recording", "truth")}
+    """The gaps of all recordings of a run, which has them only where there are further parts; from its begin."""
+    begun_ns = int(read_facts(folder).get("begun_ns", 0))
+    recordings = {name: PartedRecording(folder / f"{name}.mcap", begun_ns) for name in ("recording", "truth")}
     for recording in recordings.values():
         if len(recording.parts) > 1:
             for _ in recording.read():
