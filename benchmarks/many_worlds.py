@@ -30,12 +30,12 @@ from rich.progress import track
 from paramove.cameras import Frame, decode, encode
 from paramove.diagnosis import Eye
 from paramove.documents import Floats
-from paramove.motion import MotionPlans, MovementSource, NoPlanError, SurfaceParameters, plans_for
+from paramove.motion import MotionPlans, MovementSource, NoPlanError, plans_for
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.tracked_objects_pb2 import TrackedObject
 from paramove.objects import ColourTracker, PlaneHomography, Recognizer
-from paramove.robots import RobotDescription
+from paramove.robots import RobotDescription, SurfaceParameters
 from paramove.runs import seeds_of
 from sim import looks, places, scene, tool_box
 from sim.camera import Sensor

@@ -9,8 +9,8 @@ Publishes   operator/stop   StopRequest   when a person presses stop
 from pydantic import Field
 
 from paramove.bus import Bus, NodeConfig, Received, main, topics
-from paramove.dashboard import LivePicture, PageServer, StopButton, Surface, Texts, subscribe_to_nodes
-from paramove.robots import RobotDescription, RobotFolder
+from paramove.dashboard import LivePicture, PageServer, StopButton, Texts, subscribe_to_nodes
+from paramove.robots import RobotDescription, RobotFolder, SurfaceParameters
 
 PERCEPTION = (topics.CAMERA_IMAGE, topics.OBJECTS_TRACKED, topics.GESTURES, topics.CALIBRATION_PLANE)
 DECISION = (topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH, topics.RELOCATION_GOAL, topics.RELOCATION_STATUS)
@@ -25,7 +25,7 @@ class Config(NodeConfig):
     title: str = Field("paramove", max_length=80)
     port: int = Field(0, ge=0, le=65535)
     robot: RobotFolder | None = None
-    surface: Surface | None = None
+    surface: SurfaceParameters = SurfaceParameters()
     texts: Texts = Texts()
 
 

@@ -10,8 +10,8 @@ Publishes   arm/trajectory          JointTrajectory         event   rad
 from pathlib import Path
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
-from paramove.motion import MovementSource, SurfaceParameters, Synthesizer, plans_for
-from paramove.robots import RobotFolder
+from paramove.motion import MovementSource, Synthesizer, plans_for
+from paramove.robots import RobotFolder, SurfaceParameters
 
 SUBSCRIBES = (topics.RELOCATION_GOAL, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS)
 PUBLISHES = (topics.ARM_TRAJECTORY, topics.RELOCATION_STATUS)

@@ -12,14 +12,14 @@ from numpy.testing import assert_allclose
 
 from paramove.bus import topics
 from paramove.bus.topics import Topic
-from paramove.dashboard.live_picture import LivePicture, NodeTable, Surface
+from paramove.dashboard.live_picture import LivePicture, NodeTable
 from paramove.dashboard.robot_shape import RobotShape
-from paramove.motion.clearance import SurfaceParameters
 from paramove.msgs.action_estimate_pb2 import ActionEstimate, Location
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import RelocationStatus
+from paramove.robots import SurfaceParameters
 from tests.dashboard import scene
 from tests.robots.hoap3.movements import HOAP3
 
@@ -28,7 +28,7 @@ NOW_NS = 2_000_000_000
 
 
 def picture(*said: tuple[Topic, Any]) -> LivePicture:
-    made = LivePicture(HOAP3, "a title", Surface(), wall_s=lambda: 10.0)
+    made = LivePicture(HOAP3, "a title", SurfaceParameters(), wall_s=lambda: 10.0)
     for message in scene.heard(list(said)):
         made.handle(message)
     return made
@@ -175,10 +175,6 @@ def test_numbers_that_are_not_finite_become_nothing() -> None:
         joint.position = float("inf")
     said = [*scene.messages(), (topics.OBJECTS_TRACKED, tracked), (topics.ARM_JOINT_STATES, joints)]
     json.dumps(sections(*said), allow_nan=False)
-
-
-def test_the_surface_is_the_synthesizers() -> None:
-    assert Surface().model_dump() == SurfaceParameters().model_dump()
 
 
 def test_the_robots_gripper_is_where_its_kinematics_say() -> None:

@@ -11,12 +11,13 @@ from typing import Any
 import pytest
 
 from paramove.bus import topics
-from paramove.dashboard.live_picture import LivePicture, Surface, Texts
+from paramove.dashboard.live_picture import LivePicture, Texts
 from paramove.dashboard.server import PageServer
 from paramove.dashboard.stop_button import StopButton
 from paramove.msgs.relocation_pb2 import RelocationStatus
 from paramove.msgs.rule_pb2 import Rule, Rules, Speech
 from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
+from paramove.robots import SurfaceParameters
 from paramove.safety.gate_io import PERSON_STOP
 from tests.dashboard import scene
 from tests.dashboard.browser import Browser, program
@@ -41,7 +42,7 @@ class Run:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.alive = True
-        self.picture = LivePicture(HOAP3, "Learn rules by watching", Surface(), TEXTS, wall_s=lambda: 0.0)
+        self.picture = LivePicture(HOAP3, "Learn rules by watching", SurfaceParameters(), TEXTS, wall_s=lambda: 0.0)
         self.page = PageServer(folder)
         self.said: list[StopRequest] = []
         self.button = StopButton(self.page.was_pressed, self.said.append)
@@ -62,7 +63,7 @@ class Run:
         with self._lock:
             self.page = PageServer(self.folder)
             self.button = StopButton(self.page.was_pressed, self.said.append)
-            self.picture = LivePicture(HOAP3, "Learn rules by watching", Surface(), TEXTS, wall_s=lambda: 0.0)
+            self.picture = LivePicture(HOAP3, "Learn rules by watching", SurfaceParameters(), TEXTS, wall_s=lambda: 0.0)
             self.page.__enter__()
             self.alive = True
 
@@ -165,7 +166,7 @@ def test_all_that_a_person_wants_to_know_is_on_the_page(run: Run, browser: Brows
 
 
 def test_a_run_without_a_robot_has_picture_and_processes(run: Run, browser: Browser) -> None:
-    run.picture = LivePicture(None, "Point", Surface(), wall_s=lambda: 0.0)
+    run.picture = LivePicture(None, "Point", SurfaceParameters(), wall_s=lambda: 0.0)
     run.publish(*scene.messages())
     browser.open(run.page.link)
     browser.until("document.body?.classList.contains('without-robot')", "the page has its title")

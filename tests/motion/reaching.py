@@ -9,18 +9,19 @@ import numpy as np
 
 from paramove.demonstrations.reaching import train_reaching_model
 from paramove.motion.arm_pose import ArmPoseSolver
-from paramove.motion.clearance import ClearanceChecker, SurfaceParameters
+from paramove.motion.clearance import ClearanceChecker
 from paramove.motion.conversion import RobotMovement
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.relocation import RelocationPlanner
 from paramove.phmm import InterpolativePHMM
+from paramove.robots import SurfaceParameters
 from paramove.robots.description import Arm, RobotDescription
 
 ROBOT_FOLDER = Path(__file__).parents[2] / "robot_description" / "hoap3"
 HOAP3 = RobotDescription.load(ROBOT_FOLDER)
 ARM: Arm = HOAP3.arms["right"]
 JOINTS = [*ARM.indices, ARM.fingers_index]
-SURFACE = SurfaceParameters()
+SURFACE = SurfaceParameters().of(HOAP3, "right")
 
 # Where the objects stand, where they go and where the robot calibrates; shoulder frame, m.
 GRASP_Z = -0.098

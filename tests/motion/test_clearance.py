@@ -10,12 +10,11 @@ from paramove.motion.clearance import (
     FAR_M,
     GRASPED_ABOVE_MIDDLE,
     ClearanceChecker,
-    SurfaceParameters,
 )
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.plans import MAX_STANDING
 from paramove.motion.reaching_movement import ArmPoses
-from paramove.robots import RobotDescription
+from paramove.robots import RobotDescription, SurfaceParameters, WorkingSurface
 from tests.motion.reaching import ARM, HOAP3, JOINTS, RIGHT, SURFACE, at, checker, planner, solver
 from tests.robots.servo_arms import ARMS, ArmModel
 
@@ -112,7 +111,7 @@ def test_an_object_that_has_been_taken_away_is_forgotten() -> None:
 
 def test_a_hand_at_the_body_is_seen() -> None:
     """Poses all over the range, the table out of the way: some put the hand into the body, and it is named."""
-    table_away = ClearanceChecker(HOAP3, RIGHT, SurfaceParameters(z=-1.0))
+    table_away = ClearanceChecker(HOAP3, RIGHT, SurfaceParameters(z=-1.0).of(HOAP3, "right"))
     draw = np.random.default_rng(0)
     limits = HOAP3.soft_lower[JOINTS], HOAP3.soft_upper[JOINTS]
     poses = draw.uniform(*limits, (400, 6))
@@ -125,7 +124,7 @@ def test_a_hand_at_the_body_is_seen() -> None:
 
 
 def test_a_lower_table_is_further_away() -> None:
-    other = ClearanceChecker(HOAP3, RIGHT, SurfaceParameters(z=SURFACE.z - 0.007))
+    other = ClearanceChecker(HOAP3, RIGHT, SurfaceParameters(z=SURFACE.z - 0.007).of(HOAP3, "right"))
     angles = over_the_surface(0.035)
     gained = other.smallest(angles, [], [False]).distance - checker().smallest(angles, [], [False]).distance
     np.testing.assert_allclose(gained, 0.007, rtol=0, atol=1e-5)
@@ -151,7 +150,7 @@ def test_a_fetch_closes_the_hand_around_its_object_without_being_pushed_away_fro
 
 
 def of_servo_arm(robot: RobotDescription, table_z: float = 0.0) -> ClearanceChecker:
-    table = SurfaceParameters(x=(-1.0, 1.0), y=(-1.0, 1.0), z=table_z)
+    table = WorkingSurface(x=(-1.0, 1.0), y=(-1.0, 1.0), z=table_z)
     return ClearanceChecker(robot, GripperArm.of(robot, ""), table)
 
 

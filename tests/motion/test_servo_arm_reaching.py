@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from paramove.motion.clearance import ClearanceChecker, SurfaceParameters
+from paramove.motion.clearance import ClearanceChecker
 from paramove.motion.plans import MAX_STANDING, Grasp, NoPlanError, PlannedMotion, RestPose
 from paramove.motion.servo_arm_reaching import FINGER_GAP_M, ServoArmReaching
+from paramove.robots import WorkingSurface
 from paramove.robots.description import DescriptionError, RobotDescription
 from paramove.robots.planar_arm import OutOfReachError
 from paramove.safety.trajectory_check import check_trajectory
@@ -280,7 +281,7 @@ def test_begins_wherever_the_arm_is(name: str) -> None:
 
 @each_arm
 def test_a_standing_object_in_the_way_is_kept_clear_of(name: str) -> None:
-    robot, tall = description(name), SurfaceParameters(x=(-1.0, 1.0), y=(-1.0, 1.0), z=0.0, object_height=0.08)
+    robot, tall = description(name), WorkingSurface(x=(-1.0, 1.0), y=(-1.0, 1.0), z=0.0, object_height=0.08)
     plan = ServoArmReaching(robot, reaching_model(), tall)
     clearance = ClearanceChecker(robot, plan.arm, tall)
     source, target = (0.15, -0.08, GRASP_Z), (0.15, 0.08, GRASP_Z)

@@ -10,8 +10,8 @@ import pytest
 from pydantic import ValidationError
 
 from paramove.motion import setup
-from paramove.motion.clearance import SurfaceParameters
 from paramove.motion.setup import MovementSource, plans_for
+from paramove.robots import SurfaceParameters
 from paramove.robots.description import DescriptionError
 from tests.motion.reaching import ROBOT_FOLDER, at, reaching_model
 from tests.motion.touching import touching_model

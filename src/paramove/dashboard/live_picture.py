@@ -18,7 +18,10 @@ from paramove.dashboard.estimates import Estimates
 from paramove.dashboard.robot_shape import RobotShape, rounded
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.safety_state_pb2 import SafetyState
-from paramove.robots import RobotDescription
+from paramove.robots import AROUND_SERVO_ARM, RobotDescription, SurfaceParameters, WorkingSurface
+
+SIDE = "right"
+"""Of a humanoid's arm that works."""
 
 
 def subscribe_to_nodes(bus: Bus) -> None:
@@ -69,25 +72,6 @@ class NodeTable:
         ]
 
 
-class Surface(BaseModel):
-    """The working surface in the shoulder's frame, m, and the upright objects on it.
-
-    The synthesizer has the same parameters; its module is not imported because that takes seconds.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    x: tuple[float, float] = (0.100, 0.240)
-    y: tuple[float, float] = (-0.170, 0.130)
-    z: float = -0.134
-    object_radius: float = 0.010
-    object_height: float = 0.050
-
-
-ARM_SURFACE = Surface(x=(0.0, 0.35), y=(-0.2, 0.2), z=0.0, object_radius=0.0125)
-"""Of a servo arm, in the frame of its base."""
-
-
 class Texts(BaseModel):
     """Words of the application.
 
@@ -108,7 +92,7 @@ class LivePicture:
     Args:
         robot: Its shape, joints and base pose; None for a run without one.
         title: Of the page.
-        surface: The working surface and the objects on it; None: that of a robot of this kind.
+        surface: The working surface and the objects on it, where they are not the robot's.
         texts: Words of the application.
         begun_ns: When the run began, by the bus clock.
         wall_s: Monotonic wall clock, for the age of the nodes' statuses.
@@ -118,15 +102,16 @@ class LivePicture:
         self,
         robot: RobotDescription | None,
         title: str,
-        surface: Surface | None = None,
+        surface: SurfaceParameters,
         texts: Texts | None = None,
         *,
         begun_ns: int = 0,
         wall_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        surface = surface or (Surface() if robot is None or robot.chain is None else ARM_SURFACE)
-        self._robot = None if robot is None else _DrawnRobot(robot, surface)
-        self._estimates = Estimates((surface.x, surface.y))
+        drawn = None if robot is None else surface.of(robot, SIDE)
+        self._robot = None if robot is None or drawn is None else _DrawnRobot(robot, drawn)
+        around = drawn or AROUND_SERVO_ARM
+        self._estimates = Estimates((around.x, around.y))
         self._nodes = NodeTable()
         self._wall_s = wall_s
         self._begun_ns = begun_ns
@@ -196,7 +181,7 @@ class LivePicture:
 class _DrawnRobot:
     """The robot and its surface, as the page draws them; `joints` is the latest message of its joints."""
 
-    def __init__(self, robot: RobotDescription, surface: Surface) -> None:
+    def __init__(self, robot: RobotDescription, surface: WorkingSurface) -> None:
         origin, self._gripper = _sites_of(robot)
         self._shape = RobotShape(robot.model_path, dict(zip(robot.joint_names, robot.base_pose, strict=True)))
         self.joints: Any = None
@@ -220,7 +205,7 @@ def _sites_of(robot: RobotDescription) -> tuple[str, str]:
     """Sites of the origin of positions, the right shoulder or a servo arm's base, and of the gripper."""
     if robot.chain is not None:
         return robot.chain.sites.base, robot.chain.sites.end_effector
-    sites = robot.arm("right").sites
+    sites = robot.arm(SIDE).sites
     return sites.shoulder, sites.gripper
 
 

@@ -1,5 +1,4 @@
 from .arm_pose import ArmPoseSolver as ArmPoseSolver
-from .clearance import SurfaceParameters as SurfaceParameters
 from .conversion import RobotMovement as RobotMovement
 from .gripper_arm import GripperArm as GripperArm
 from .model_check import check_model as check_model

@@ -8,13 +8,12 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict
 
 from paramove.documents import Floats, Ints
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.model_check import check_model, qpos_addresses
 from paramove.motion.plans import MAX_STANDING, check_number
-from paramove.robots import DescriptionError, RobotDescription
+from paramove.robots import RobotDescription, WorkingSurface
 
 FAR_M = 0.05
 """Larger distances are not distinguished."""
@@ -22,21 +21,6 @@ GRASPED_ABOVE_MIDDLE = 0.011
 _HIDDEN = 10.0
 _THICKNESS_M = 0.1  # of the box
 _ADDED = ("surface", "held", *(f"standing_{k}" for k in range(MAX_STANDING)))
-
-
-class SurfaceParameters(BaseModel):
-    """A humanoid's working surface in the shoulder's frame, m, and the upright objects on any arm's.
-
-    Its working plane is the upper face of a box; the objects are cylinders.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    x: tuple[float, float] = (0.100, 0.240)
-    y: tuple[float, float] = (-0.170, 0.130)
-    z: float = -0.134
-    object_radius: float = 0.010
-    object_height: float = 0.050
 
 
 @dataclass(frozen=True)
@@ -69,13 +53,10 @@ class ClearanceChecker:
     Raises DescriptionError if the robot's model does not fit its description.
     """
 
-    def __init__(self, robot: RobotDescription, arm: GripperArm, surface: SurfaceParameters) -> None:
+    def __init__(self, robot: RobotDescription, arm: GripperArm, surface: WorkingSurface) -> None:
         check_model(robot)
         self.surface = surface
-        try:
-            self._model = model = _compiled(robot, surface)
-        except ValueError as error:  # of MuJoCo
-            raise DescriptionError(f"{robot.model_path} does not fit the robot's description: {error}") from error
+        self._model = model = _compiled(robot, surface)
         self._data = data = mujoco.MjData(model)
         data.qpos[qpos_addresses(model, robot.joint_names)] = robot.base_pose
         self._qpos = qpos_addresses(model, arm.joints)
@@ -215,7 +196,7 @@ class ClearanceChecker:
         return str(self._model.geom(geom).name or self._model.body(int(self._model.geom_bodyid[geom])).name)
 
 
-def _compiled(robot: RobotDescription, surface: SurfaceParameters) -> mujoco.MjModel:
+def _compiled(robot: RobotDescription, surface: WorkingSurface) -> mujoco.MjModel:
     """The robot's model with the surface and hidden cylinders, which collide with nothing by themselves."""
     spec = mujoco.MjSpec.from_file(str(robot.model_path))
     alone = {"contype": 0, "conaffinity": 0}

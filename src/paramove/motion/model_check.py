@@ -27,7 +27,7 @@ def check_model(robot: RobotDescription) -> None:
     try:
         model = mujoco.MjModel.from_xml_path(str(robot.model_path))
     except ValueError as error:
-        raise DescriptionError(f"MuJoCo does not take {robot.model_path}: {error}") from error
+        raise DescriptionError(f"{robot.model_path} does not fit the robot's description: {error}") from error
     for side in robot.arms or [""]:
         _check_arm(robot, GripperArm.of(robot, side), model)
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
-from paramove.motion.clearance import ClearanceChecker, SurfaceParameters
+from paramove.motion.clearance import ClearanceChecker
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.hand_poses import HandPoses
 from paramove.motion.learned_path import SMOOTHING, LearnedPath, PlacedPerson
@@ -35,7 +35,7 @@ from paramove.motion.plans import (
 )
 from paramove.motion.timing import PEAK_VELOCITY, minimum_jerk, ramped, rest_to_rest, smoothed
 from paramove.phmm import ParametricHMM
-from paramove.robots import DescriptionError, OutOfReachError, RobotDescription
+from paramove.robots import DescriptionError, OutOfReachError, RobotDescription, SurfaceParameters, WorkingSurface
 
 POINTS = 48
 """Number of points of a learned path."""
@@ -80,7 +80,7 @@ class ServoArmReaching:
         self,
         description: RobotDescription,
         model: ParametricHMM,
-        surface: SurfaceParameters | None = None,
+        surface: WorkingSurface | None = None,
     ) -> None:
         chain = description.chain
         if chain is None:
@@ -98,7 +98,8 @@ class ServoArmReaching:
         self.start_tolerance = float(np.deg2rad(description.stream.start_tolerance_deg))
         self._period = description.stream.period_us * 1e-6
         sides = (-_TABLE_M, _TABLE_M)
-        table = (surface or SurfaceParameters()).model_copy(update={"x": sides, "y": sides, "z": 0.0})
+        surface = surface or SurfaceParameters().of(description, "")
+        table = surface.model_copy(update={"x": sides, "y": sides, "z": 0.0})
         self._clearance = ClearanceChecker(description, self.arm, table)
         self._poses = HandPoses(chain, self._clearance, self.arm.angle_of(o.work_opening), self.base_angles[:-1])
         length = float(np.hypot(*self._arm.upper_arm) + np.hypot(*self._arm.forearm) + self._arm.hand[0])

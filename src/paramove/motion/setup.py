@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, model_validator
 from paramove.demonstrations import train_reaching_model
 from paramove.motion.arm_pose import ArmPoseSolver
 from paramove.motion.clear_plans import ClearPlans
-from paramove.motion.clearance import ClearanceChecker, SurfaceParameters
+from paramove.motion.clearance import ClearanceChecker
 from paramove.motion.gripper_arm import GripperArm
 from paramove.motion.modelled_movement import robot_movement
 from paramove.motion.plans import MotionPlans
@@ -21,7 +21,7 @@ from paramove.motion.recorded_reaching import people_model
 from paramove.motion.relocation import RelocationPlanner
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.phmm import ParametricHMM
-from paramove.robots import RobotDescription
+from paramove.robots import RobotDescription, SurfaceParameters
 
 _log = logging.getLogger(__name__)
 
@@ -69,10 +69,11 @@ def _cache_folder() -> Path | None:
 def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> MotionPlans:
     """The planner of the robot's movements, from files: of its servo arm, or of its arm on this side."""
     robot = RobotDescription.load(robot_folder)
+    working_surface = surface.of(robot, side)
     if robot.chain is not None:
-        return ServoArmReaching(robot, movement.trained(), surface)
+        return ServoArmReaching(robot, movement.trained(), working_surface)
     arm = robot.arm(side)
     solver = ArmPoseSolver(robot, arm)
     planner = RelocationPlanner(robot_movement(movement.trained(), solver.length), solver, robot, arm)
     gripper_arm = GripperArm.of(robot, side)
-    return ClearPlans(gripper_arm, planner, ClearanceChecker(robot, gripper_arm, surface))
+    return ClearPlans(gripper_arm, planner, ClearanceChecker(robot, gripper_arm, working_surface))

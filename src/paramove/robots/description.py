@@ -27,6 +27,7 @@ from paramove.robots.description_file import (
     FirmwareParameters,
     RobotFile,
     StreamParameters,
+    SurfacePart,
     read_robot_file,
 )
 from paramove.robots.joint_units import JointUnits
@@ -63,6 +64,7 @@ class Arm:
         felt_opening, holding_openings: How a held object is detected: see `FingersPart`.
         kinematics: Forward kinematics in the frame of the shoulder site.
         above_table: None: it cannot begin movements above a table.
+        surface: None: there is none before it.
     """
 
     joints: tuple[str, ...]
@@ -76,6 +78,7 @@ class Arm:
     sites: ArmSites
     kinematics: ArmKinematics
     above_table: AboveTable | None
+    surface: SurfacePart | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,6 +290,7 @@ def _arm(names: tuple[str, ...], arm: ArmPart) -> Arm:
         sites=arm.sites,
         kinematics=ArmKinematics(arm.upper_arm, arm.gripper_from_elbow, arm.fingertip_from_elbow),
         above_table=None if arm.above_table is None else _above_table(arm.above_table),
+        surface=arm.surface,
     )
 
 

@@ -128,6 +128,14 @@ class AboveTablePart(_Part):
     via_deg: tuple[tuple[float, float, float, float, float], ...]
 
 
+class SurfacePart(_Part):
+    """The upper face of what stands before an arm, on which it works; ranges and height, frame of the arm's base, m."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    z: float
+
+
 class ArmPart(_Part):
     """One arm; lengths in m."""
 
@@ -138,6 +146,7 @@ class ArmPart(_Part):
     gripper_from_elbow: tuple[float, float, float]
     fingertip_from_elbow: tuple[float, float, float]
     above_table: AboveTablePart | None = None
+    surface: SurfacePart | None = None
 
 
 class BusParameters(_Part):
