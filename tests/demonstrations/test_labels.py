@@ -41,7 +41,7 @@ def test_good_labels_are_read(tmp_path):
     [
         ("subject: 3", "subjekt: 3", ":5:80: unknown key 'subjekt'; did you mean 'subject'?"),
         ("action: pointing", "aktion: pointing", ":9:5: unknown key 'aktion'; did you mean 'action'?"),
-        ("start: 0.5", "start: soon", ":5:25: segments.0.start: expected a number, without quotes, found 'soon'"),
+        ("start: 0.5", "start: soon", ":5:25: segments.0.start: expected a number, found 'soon'"),
         ("start: 0.5", "start: -1", "start: input should be greater than or equal to 0, found -1"),
         ("start: 0.5", "start: .nan", ":5:32: '.nan' is rejected: numbers are finite"),
         ("end: 2,", "end: 0.25,", "the segment ends at 0.25 s, before its start at 0.5 s"),

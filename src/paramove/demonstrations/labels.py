@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
@@ -21,8 +20,7 @@ from paramove.documents import (
     Document,
     DocumentError,
     KeyPath,
-    closest,
-    nearest,
+    checked,
     raise_any,
     read_mapping,
     read_text,
@@ -128,7 +126,7 @@ def load_labels(path: Path) -> Labels:
         )
     try:
         document = read_mapping(_text(path), str(path), max_characters=MAX_CHARACTERS, example=EXAMPLE)
-        labels = Labels(path, _validated(document), document)
+        labels = Labels(path, checked(LabelsFile, document), document)
         raise_any(_contradictions(labels))
     except DocumentError as error:
         raise LabelsError(error) from error
@@ -137,37 +135,6 @@ def load_labels(path: Path) -> Labels:
 
 def _text(path: Path) -> str:
     return read_text(path, "text of labels", DemonstrationError, 4 * MAX_CHARACTERS)
-
-
-def _validated(document: Document) -> LabelsFile:
-    try:
-        return LabelsFile.model_validate(document.data)
-    except ValidationError as error:
-        unknown = [one["loc"] for one in error.errors() if one["type"] == "extra_forbidden"]
-        # A key that is missing only because it is mistyped is reported once.
-        mistyped = {(*loc[:-1], meant) for loc in unknown for meant in closest(str(loc[-1]), Segment.model_fields)}
-        reported = [one for one in error.errors() if one["type"] != "missing" or tuple(one["loc"]) not in mistyped]
-        raise DocumentError.of([_finding(document, one) for one in reported]) from error
-
-
-_EXPECTED = {
-    "model_type": "expected a mapping 'key: value'",
-    "list_type": "expected a list in brackets",
-    "string_type": "expected a text, in quotes if it could be something else",
-    "float_type": "expected a number, without quotes",
-    "int_type": "expected a whole number, without quotes",
-}
-
-
-def _finding(document: Document, details: ErrorDetails) -> DocumentError:
-    path = tuple(str(part) for part in details["loc"])
-    keys = list((Segment if path[:1] == ("segments",) and len(path) > 2 else LabelsFile).model_fields)
-    if details["type"] == "extra_forbidden":
-        return document.error(path, f"unknown key '{path[-1]}'; {nearest(path[-1], keys)}")
-    if details["type"] == "missing":
-        return document.error(path, f"'{path[-1]}' of this segment is missing")
-    message = _EXPECTED.get(details["type"], details["msg"][0].lower() + details["msg"][1:])
-    return document.error(path, f"{'.'.join(path)}: {message}, found {details['input']!r:.80}")
 
 
 def _contradictions(labels: Labels) -> list[DocumentError]:

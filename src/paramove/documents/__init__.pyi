@@ -6,6 +6,8 @@ from .array_types import Ints as Ints
 from .arrays import read_arrays as read_arrays
 from .atomic_writing import rename_durably as rename_durably
 from .atomic_writing import replacing as replacing
+from .checking import checked as checked
+from .checking import keys_at as keys_at
 from .exit_codes import FAILURE as FAILURE
 from .exit_codes import NEVER_RESTARTED as NEVER_RESTARTED
 from .exit_codes import OK as OK

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
-
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
+from typing import Any
 
 from paramove.bus import topics
 from paramove.documents import (
@@ -19,7 +16,7 @@ from paramove.documents import (
     InputError,
     KeyPath,
     Position,
-    closest,
+    checked,
     exit_codes,
     nearest,
     raise_any,
@@ -27,10 +24,11 @@ from paramove.documents import (
     read_text,
     read_value,
 )
-from paramove.supervision.launch_schema import LaunchFile, NodeSettings
+from paramove.supervision.launch_schema import LaunchFile
 from paramove.workspace import Workspace
 
-_QUOTED = re.compile(r"'([^']*)'")
+_MODULE = "names joined by dots, such as nodes.camera"
+_PATTERNS = {"module": _MODULE, "after_run": _MODULE, "": "a name such as my_node"}
 _PLAIN_NAME = re.compile(r"[a-z][a-z0-9_]*")
 _FOLDER = Path("launch")
 SERVO_ARM = "servo_arm"
@@ -272,20 +270,7 @@ def _cycles(after: dict[str, list[str]]) -> list[tuple[str, ...]]:
 
 def validated(document: Document) -> LaunchFile:
     """The document as a `LaunchFile`; raises DocumentError with every finding, one per line."""
-    try:
-        return LaunchFile.model_validate(document.data)
-    except ValidationError as error:
-        raise DocumentError.of([_finding(document, details) for details in _causes(error.errors())]) from error
-
-
-def _causes(details: Sequence[ErrorDetails]) -> list[ErrorDetails]:
-    """Findings without the keys that are missing only because they are mistyped."""
-    mistyped = set()
-    for one in details:
-        if one["type"] == "extra_forbidden":
-            *above, key = (str(part) for part in one["loc"])
-            mistyped |= {(*above, meant) for meant in closest(key, _keys_at(tuple(above)))}
-    return [one for one in details if one["type"] != "missing" or tuple(map(str, one["loc"])) not in mistyped]
+    return checked(LaunchFile, document, _PATTERNS)
 
 
 def overlay_folders(launch: str) -> tuple[Path, Path]:
@@ -336,56 +321,3 @@ def _read(path: Path) -> Document:
     except InputError as error:
         raise DocumentError(Position(str(path)), str(error).removeprefix(f"{path}: ")) from error
     return read_mapping(topics.present_names(text), str(path))
-
-
-def _finding(document: Document, details: ErrorDetails) -> DocumentError:
-    """One finding of pydantic with the position in the file and the nearest valid key."""
-    path = tuple(str(part) for part in details["loc"] if part != "[key]")
-    name = ".".join(path) or "the launch file"
-    if details["type"] == "extra_forbidden":
-        return document.error(path, f"unknown key '{path[-1]}'; {nearest(path[-1], _keys_at(path[:-1]))}")
-    if details["type"] == "missing":
-        return document.error(path, f"{name} is missing")
-    message = _EXPECTED.get(details["type"], details["msg"][0].lower() + details["msg"][1:])
-    if details["type"] == "string_pattern_mismatch":
-        is_module = path[-1] in ("module", "after_run")
-        message = f"expected {'names joined by dots, such as nodes.camera' if is_module else 'a name such as my_node'}"
-    value = details["input"]
-    message += f", found {value!r:.200}"
-    if details["type"] == "literal_error":
-        message += f"; {nearest(str(value), _QUOTED.findall(details['msg']))}"
-    elif details["type"] in ("int_type", "float_type") and isinstance(value, str):
-        message += "; write a number, without quotes"
-    return document.error(path, f"{name}: {message}")
-
-
-_EXPECTED = {
-    "bool_type": "expected true or false",
-    "dict_type": "expected a mapping 'key: value'",
-    "model_type": "expected a mapping 'key: value'",
-    "list_type": "expected a list in brackets",
-    "string_type": "expected a text, in quotes if it could be something else",
-}
-"""Type of a finding of pydantic -> what to write instead."""
-
-
-def _keys_at(path: KeyPath) -> list[str]:
-    """Valid keys of the mapping at `path` of a launch file."""
-    return keys_at(NodeSettings, path[2:]) if path[:1] == ("nodes",) else keys_at(LaunchFile, path)
-
-
-def keys_at(kind: Any, path: Sequence[str]) -> list[str]:
-    """Valid keys of the mapping at `path` of a model or a dataclass; none where it holds no further one."""
-    for key in path:
-        inner = _fields(kind).get(key)
-        kind = next((candidate for candidate in (inner, *get_args(inner)) if _fields(candidate)), None)
-    return list(_fields(kind))
-
-
-def _fields(kind: Any) -> dict[str, Any]:
-    """Name -> type of the fields of a model or a dataclass."""
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        return {name: field.annotation for name, field in kind.model_fields.items()}
-    if isinstance(kind, type) and is_dataclass(kind):
-        return {field.name: field.type for field in fields(kind)}
-    return {}

@@ -22,11 +22,11 @@ from platformdirs import user_cache_path
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from paramove.documents import DocumentError, nearest
+from paramove.documents import DocumentError, keys_at, nearest
 from paramove.source_code import code_digest
 from paramove.supervision.environment import run_python
 from paramove.supervision.interfaces import Interface
-from paramove.supervision.launch_file import Launch, keys_at
+from paramove.supervision.launch_file import Launch
 from paramove.workspace import Workspace
 
 TIMEOUT_S = 120.0
