@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from paramove.applications.options import within
 from paramove.msgs.rule_pb2 import Speech
 from sim import looks, tool_box
 from sim.arm import ELBOW, SHOULDER, TIP
@@ -59,7 +60,7 @@ def test_points_at_free_places_that_the_robot_reaches(seed):
     for _ in range(3):
         story.instructor.handle(PLACE, OBJECT)
         x, y, z = story.until_there()
-        assert OPTIONS.area.contains((x, y), 0.003)
+        assert within((x, y), OPTIONS.area_x, OPTIONS.area_y, 0.003)
         assert z == pytest.approx(tool_box.SURFACE_Z + POINTED_ABOVE_PLANE)
         assert np.hypot(x - OPTIONS.hold[0], y - OPTIONS.hold[1]) >= FREE_OF_ROBOT
         assert np.hypot(x - before[0], y - before[1]) >= ANOTHER_PLACE
