@@ -49,7 +49,8 @@ def checked(model: type[Model], document: Document, patterns: Mapping[str, str] 
 def keys_at(kind: Any, path: Sequence[str]) -> list[str]:
     """Valid keys of the mapping at `path` of a model or a dataclass; none where it holds no further one."""
     for key in path:
-        inner = _fields(kind).get(key) if _fields(kind) else _item(kind)
+        known = _fields(kind)
+        inner = known.get(key) if known else _item(kind)
         candidates = (inner, *get_args(inner))
         kind = next((one for one in candidates if _fields(one) or _item(one) is not None), None)
     return list(_fields(kind))
@@ -57,9 +58,10 @@ def keys_at(kind: Any, path: Sequence[str]) -> list[str]:
 
 def _item(kind: Any) -> Any:
     """Type of the values of a dictionary, or of the items of a list or a tuple; None for any other type."""
-    positions = {dict: 1, list: 0, tuple: 0}
-    position = positions.get(get_origin(kind) or kind)
-    return get_args(kind)[position] if position is not None and get_args(kind) else None
+    container, parts = get_origin(kind), get_args(kind)
+    if container is dict:
+        return parts[1]
+    return parts[0] if parts and container in (list, tuple) else None
 
 
 def _fields(kind: Any) -> dict[str, Any]:
