@@ -12,7 +12,9 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # One more than processors, up to four: a third of the time tests wait, for arms that move in real time and for each other.
 WORKERS := $(shell n=$$(getconf _NPROCESSORS_ONLN); echo $$((n < 4 ? n + 1 : 4)))
 
-.PHONY: help wheel demo test test-long test-hardware check docs results ci format setup messages lock benchmark-seeds coverage mutation bare clean
+FINDINGS ?= $(wildcard findings/*.sh)
+
+.PHONY: help wheel demo test test-long test-hardware check docs results findings ci format setup messages lock benchmark-seeds coverage mutation bare clean
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -46,6 +48,9 @@ wheel: setup ## the package as one file in build/dist, to be installed anywhere 
 
 results: setup ## measures again what the pages print (hours), or some of it: make results ARGS="imitation pointing"
 	@$(BIN)/python docs/results.py --run $(or $(ARGS),all)
+
+findings: ## repeats what was found in other packages, each in an environment of its own: make findings FINDINGS=findings/NAME.sh
+	@failed=0; for finding in $(FINDINGS); do echo "== $$finding"; bash "$$finding" || { failed=1; echo "changed: $$finding"; }; done; exit $$failed
 
 ci: ## check and test as on a machine that lacks everything; as root it installs Debian packages
 	@.ci/run

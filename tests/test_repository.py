@@ -168,6 +168,22 @@ def links(path):
             yield target.partition("#")[0]
 
 
+def test_findings_have_their_form():
+    """Each script states what was expected and seen, pins its packages, and runs in its own folder without paramove."""
+    findings = [path for path in FILES if path.parent == ROOT / "findings"]
+    assert findings
+    for path in findings:
+        text = path.read_text(encoding="utf-8")
+        code = "\n".join(line for line in text.splitlines() if not line.startswith("#"))
+        assert path.suffix == ".sh", name(path)
+        assert re.search(r"^# Expected: ", text, re.MULTILINE), name(path)
+        assert re.search(r"^# Seen: ", text, re.MULTILINE), name(path)
+        assert "set -euo pipefail" in code, name(path)
+        assert "mktemp -d" in code, name(path)
+        assert re.search(r"(pip|npm|cargo|go)\S* .*(==|@)\S*\d", code), f"{name(path)} pins no version"
+        assert "paramove" not in code, name(path)
+
+
 def test_links_inside_the_repository_lead_somewhere():
     pages = [path for path in FILES if path.suffix == ".md"]
     dead = [f"{name(path)}: {to}" for path in pages for to in links(path) if not (path.parent / to).exists()]
