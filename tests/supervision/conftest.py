@@ -59,9 +59,9 @@ class OwnWorkspace:
             file.seek(0)
             return outcome, folder, file.read()
 
-    def start(self, *arguments, **options):
-        """Starts the launcher as a process of its own."""
-        command = [sys.executable, "-m", "paramove.cli.launch", "test", *arguments]
+    def start(self, *arguments, command=None, **options):
+        """Starts the launcher, or a command that does, as a process of its own."""
+        command = command or [sys.executable, "-m", "paramove.cli.launch", "test", *arguments]
         options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, **options}
         launcher = subprocess.Popen(command, cwd=self.root, **options)
         self.launchers.append(launcher)

@@ -4,6 +4,7 @@ import os
 import pty
 import signal
 import subprocess
+import sys
 
 import pytest
 
@@ -88,6 +89,35 @@ def test_closed_terminal_ends_the_nodes(workspace):
     workspace.await_event("two ready", launcher)
     os.close(terminal)
     assert launcher.wait(timeout=60) == 129
+    assert workspace.processes() == {}
+
+
+@pytest.mark.parametrize("begin", ["nohup", "trap '' HUP; exec"], ids=["output in a file", "output at the terminal"])
+def test_a_run_that_ignores_hangups_survives_its_terminal(workspace, begin):
+    workspace.write(TWO.replace("after: [one]", "after: [one], restart: always"))
+    terminal, end = pty.openpty()
+    launcher = workspace.start(
+        command=["bash", "-c", f"{begin} {sys.executable} -m paramove.cli.launch test"],
+        stdin=end,
+        stdout=end,
+        stderr=end,
+        text=False,
+        preexec_fn=lambda: os.login_tty(end),
+    )
+    os.close(end)
+    workspace.await_event("two ready", launcher)
+    nodes = {event["node"]: event["pid"] for event in workspace.happened if event["event"] == "started"}
+    os.close(terminal)
+    pid = workspace.happened[0]["pid"]
+    for process in (pid, *nodes.values()):
+        os.kill(process, signal.SIGHUP)
+    os.kill(nodes["two"], signal.SIGTERM)  # handled after the hangup
+    workspace.await_happening(launcher, "two", "ended")
+    until(lambda: workspace.events.count("two ready") == 2, "the node is started again")
+    assert "run_stops" not in [event["event"] for event in workspace.happened]
+    os.kill(pid, signal.SIGTERM)
+    assert launcher.wait(timeout=60) == 143
+    assert [event for event in workspace.events if event.endswith(" ended")][-2:] == ["two ended", "one ended"]
     assert workspace.processes() == {}
 
 

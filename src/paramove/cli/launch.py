@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from paramove.cli import completions
+from paramove.terminal_size import drop_unusable_sizes
 
 app = typer.Typer(add_completion=False)
 
@@ -86,4 +87,5 @@ def launch(
 
 
 if __name__ == "__main__":
+    drop_unusable_sizes()
     app()

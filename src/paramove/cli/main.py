@@ -18,6 +18,7 @@ import typer
 from paramove.cli.completions import typed_words
 from paramove.documents import UNAVAILABLE, InputError
 from paramove.linear_algebra_threads import use_one_thread
+from paramove.terminal_size import drop_unusable_sizes
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("paramove.cli.demo", "Run the demonstration: `paramove launch rule_learning`."),
@@ -88,6 +89,7 @@ def wanted_command(arguments: Sequence[str], environment: Mapping[str, str]) -> 
 def main() -> None:
     """Entry point of the `paramove` script."""
     use_one_thread()
+    drop_unusable_sizes()
     try:
         build(wanted_command(sys.argv, os.environ))(prog_name="paramove")
     except ModuleNotFoundError as error:

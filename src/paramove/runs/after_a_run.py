@@ -15,6 +15,7 @@ from rich.console import Console
 from paramove.documents import exit_codes, replacing
 from paramove.runs.recorded_run import RunFolderError, gaps_in, read_facts
 from paramove.supervision import QueuedOutput
+from paramove.terminal_size import drop_unusable_sizes
 
 Evaluate = Callable[[argparse.Namespace, Console], tuple[bool | None, Sequence[Path | None]]]
 
@@ -31,6 +32,7 @@ def evaluated(
             what it should, None if it is unknown, and the files that it wrote, which are printed (None: not written).
             Raises RunFolderError for a folder that holds no such run.
     """
+    drop_unusable_sizes()
     parser = argparse.ArgumentParser(prog=f"python -m {module}", description=described)
     parser.add_argument("run_folder", type=lambda text: Path(text).resolve())
     for flag, text in {"--no-video": "write no video", **flags}.items():

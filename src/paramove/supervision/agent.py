@@ -40,6 +40,7 @@ from paramove.supervision.environment import LimitError, allow_open_files
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.launch_schema import LaunchFile
 from paramove.supervision.processes import Guard, SupervisedProcess, node_process
+from paramove.supervision.queued_output import ignored_by_nohup
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.stopping import stop_in_waves
 from paramove.workspace import Workspace
@@ -98,7 +99,8 @@ class Agent:
         self._ends = False
         self._latest_s = self._alive_due_s = time.monotonic()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, self._end)
+            if not ignored_by_nohup(number):
+                signal.signal(number, self._end)
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
     def run(self) -> bool:

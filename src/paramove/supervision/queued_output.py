@@ -54,8 +54,11 @@ class QueuedOutput:
 
     @property
     def closed_by(self) -> signal.Signals | None:
-        """None while standard output has a reader; then SIGHUP if it was a terminal, else SIGPIPE."""
-        if self._stdout is None:
+        """None while standard output has a reader; then SIGHUP if it was a terminal, else SIGPIPE.
+
+        With `nohup` the run survives its terminal: None then, too.
+        """
+        if self._stdout is None or (self._is_terminal and ignored_by_nohup(signal.SIGHUP)):
             return None
         poll = select.poll()
         poll.register(self._stdout, 0)
@@ -115,6 +118,11 @@ class _Raw(io.RawIOBase):
     def write(self, data: bytes) -> int:  # type: ignore[override]
         self._put((self._descriptor, bytes(data)))
         return len(data)
+
+
+def ignored_by_nohup(number: signal.Signals) -> bool:
+    """Whether this is SIGHUP and was ignored when this process started, as `nohup` and `trap '' HUP` do."""
+    return number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN
 
 
 def _descriptor(stream: TextIO | None) -> int | None:

@@ -23,6 +23,7 @@ from paramove.supervision.environment import node_environment
 from paramove.supervision.events import EventLog, signal_name
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.processes import Guard, SupervisedProcess, last_lines, node_process
+from paramove.supervision.queued_output import ignored_by_nohup
 from paramove.supervision.remote_host import RemoteHost
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.stopping import stop_in_waves
@@ -326,7 +327,8 @@ class Supervisor:
 class Interrupts:
     """While the block lasts, the signals that end a run are counted instead of ending the process.
 
-    Those by which a terminal suspends a process are ignored: the nodes would run on without supervision.
+    Those by which a terminal suspends a process are ignored: the nodes would run on without supervision. SIGHUP stays
+    ignored where `nohup` ignores it.
 
     Attributes:
         first: The first of these signals, None before.
@@ -344,7 +346,8 @@ class Interrupts:
         self._before: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
-        handlers = dict.fromkeys(_ENDS, self._handle) | dict.fromkeys(_SUSPENDS, self._suspend)
+        ends = [number for number in _ENDS if not ignored_by_nohup(number)]
+        handlers = dict.fromkeys(ends, self._handle) | dict.fromkeys(_SUSPENDS, self._suspend)
         for number, handler in {**handlers, signal.SIGCHLD: self._wake}.items():
             self._before[number] = signal.signal(number, handler)
         return self
