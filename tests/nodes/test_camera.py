@@ -47,7 +47,7 @@ def test_says_each_frame_of_a_video_file_once(tmp_path: Path) -> None:
         assert np.abs(decode(said.message).astype(int) - picture).mean() < 6
 
 
-def test_leaves_out_frames_of_a_faster_file(tmp_path: Path) -> None:
+def test_leaves_out_frames_of_a_faster_file_and_publishes_the_times_of_the_others(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (480, 360))
     for seed in range(12):
@@ -55,7 +55,9 @@ def test_leaves_out_frames_of_a_faster_file(tmp_path: Path) -> None:
     writer.release()
     bus = bus_with_ticks(30)
     camera.run(bus, camera.Config(source=f"file:{path}"))
-    assert len(bus.published) == 6
+    captured_ns = np.array([said.captured_ns for said in bus.published])
+    times_s = (captured_ns - captured_ns[0]) * 1e-9
+    np.testing.assert_allclose(times_s, np.array([0, 2, 4, 6, 8, 10, 11]) / 30, rtol=0, atol=1e-3)
 
 
 def test_compresses_the_light_of_a_topic_and_recovers_from_bad_frames() -> None:

@@ -12,12 +12,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
-import cv2
 import numpy as np
 
 from paramove.cameras.calibration import GOOD_VIEWS, CalibrationError
 from paramove.cameras.charuco_board import BoardFinder, BoardView
-from paramove.documents import Image, InputError, opened_video, read_picture
+from paramove.cameras.frames import FrameError, SourceError
+from paramove.cameras.video_file import VideoFile
+from paramove.documents import Image, InputError, read_picture
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 TABLE_PREFIX = "table"
@@ -206,14 +207,12 @@ def file_source(path: Path) -> FolderImages | VideoImages:
 
 
 def _video(path: Path) -> Iterator[tuple[float, Image]]:
-    capture = opened_video(path)
+    """Time, s, and image of each frame. Raises SourceError if there is no video, or one with wrong times."""
+    video = VideoFile(path)
     try:
-        rate_hz, count = capture.get(cv2.CAP_PROP_FPS), 0
-        while True:
-            done, image = capture.read()
-            if not done:
-                break
-            yield count / rate_hz, image
-            count += 1
+        while (frame := video.read()) is not None:
+            yield frame.time_s, frame.image_bgr
+    except FrameError as error:
+        raise SourceError(str(error)) from error
     finally:
-        capture.release()
+        video.close()

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
+from paramove.documents import InputError, decoded
 
 _LENGTH = struct.Struct(">I")
 MAX_BYTES = 2**24
@@ -42,8 +41,10 @@ class CameraSocket:
 
     def retrieve(self) -> tuple[bool, Any]:
         """Whether the grabbed image is sound, and the image, BGR."""
-        image = cv2.imdecode(np.frombuffer(self._encoded, dtype=np.uint8), cv2.IMREAD_COLOR)
-        return image is not None, image
+        try:
+            return True, decoded(self._encoded)
+        except InputError:
+            return False, None
 
     def set(self, prop: int, value: float) -> bool:
         """Nothing can be requested."""

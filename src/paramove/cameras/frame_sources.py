@@ -14,9 +14,10 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.cameras.camera_socket import CameraSocket
-from paramove.cameras.frames import EndOfFrames, Frame, FrameError, decode, image_of_raw
+from paramove.cameras.frames import EndOfFrames, Frame, FrameError, SourceError, decode, image_of_raw
+from paramove.cameras.video_file import VideoFile, VideoFrame
 from paramove.devices import holders
-from paramove.documents import Image, InputError, opened_video, read_picture
+from paramove.documents import Image, InputError, read_picture
 from paramove.recording import Recorded, read
 
 _log = logging.getLogger(__name__)
@@ -25,16 +26,10 @@ SOURCES = "topic:camera/image_raw, file:PATH, device:PATH, folder:PATH@RATE or r
 TIMEOUT_NS = 1_000_000_000
 """A source without frames for longer has a fault."""
 PICTURES = (".jpg", ".jpeg", ".png", ".bmp")
+TICK_S = 1.0 / 15.0
+"""Time between two requests of a node for a frame."""
 TICK_FRACTION = 0.25
-"""Fraction of a frame's period by which it may be early, as ticks are rounded to milliseconds."""
-
-
-class SourceError(FrameError, InputError):
-    """A source that cannot be opened; the message gives what was found and the remedy."""
-
-    def __init__(self, message: str, missing: bool = False) -> None:
-        InputError.__init__(self, message, missing)
-        self.kind = "missing" if missing else "source"
+"""Fraction of a frame's period, or of a tick if that is shorter, by which it may be early, as ticks are not exact."""
 
 
 class Capture(Protocol):
@@ -93,46 +88,56 @@ class PlayedFrames(FrameSource):
         self._start_ns = now_ns if self._start_ns is None else self._start_ns
         return now_ns - self._start_ns
 
+    def _played(self, image: Image, index: int, time_s: float, now_ns: int) -> Frame:
+        """A frame whose capture time is that of its source, `time_s` since the first one, and never later than now."""
+        start_ns = now_ns if self._start_ns is None else self._start_ns
+        return Frame(image, min(now_ns, start_ns + round(1e9 * time_s)), index)
+
 
 class FileFrames(PlayedFrames):
-    """Frames of a video file.
+    """Frames of a video file, at the times that the file gives them.
 
-    Raises SourceError if the file does not exist or is no video; EndOfFrames after the last frame.
+    Raises SourceError if the file does not exist, is no video or has no usable frame; EndOfFrames after the last frame.
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
-        capture = opened_video(path, SourceError)
-        self._rate_hz = capture.get(cv2.CAP_PROP_FPS)
-        self._count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-        readable = capture.grab()
-        capture.release()
-        if not readable:
+        self._video = VideoFile(path)
+        self._waiting = self._read()
+        if self._waiting is None:
+            self._video.close()
             raise SourceError(f"{path} ({path.stat().st_size} bytes) holds no frame: it is cut off or damaged")
-        self._capture: Capture = opened_video(path, SourceError)  # from the first frame on
-        self._grabbed = 0
 
     def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
-        """The frame of the video that is due. Raises EndOfFrames after the last one, FrameError."""
-        due = int(self._elapsed_ns(now_ns) * 1e-9 * self._rate_hz + TICK_FRACTION) + 1
-        if self._grabbed >= due:
-            return None
-        while self._grabbed < due:
-            if not self._capture.grab():
-                raise self._end()
-            self._grabbed += 1
-        done, image = self._capture.retrieve()
-        if not done:
-            raise FrameError(f"frame {self._grabbed - 1} of {self._path} cannot be decoded", "corrupt")
-        return Frame(image, now_ns, self._grabbed - 1)
+        """The latest frame that is due. Raises EndOfFrames after the last one, FrameError for one that is unusable."""
+        elapsed_s = 1e-9 * self._elapsed_ns(now_ns)
+        latest: VideoFrame | None = None
+        while isinstance(self._waiting, VideoFrame) and self._waiting.time_s - _early_s(self._waiting) <= elapsed_s:
+            latest = self._waiting
+            self._waiting = self._read()
+        if latest is not None:
+            return self._played(latest.image_bgr, latest.index, latest.time_s, now_ns)
+        if self._waiting is None:
+            raise EndOfFrames(self._video.ending())
+        if isinstance(self._waiting, FrameError):
+            unusable = self._waiting
+            self._waiting = self._read()
+            raise unusable
+        return None
 
     def close(self) -> None:
         """Close the file."""
-        self._capture.release()
+        self._video.close()
 
-    def _end(self) -> EndOfFrames:
-        early = f" of {self._count}: the file is cut off" if self._grabbed < self._count else ""
-        return EndOfFrames(f"{self._path} has ended after {self._grabbed} frames{early}")
+    def _read(self) -> VideoFrame | FrameError | None:
+        """The next frame, what is wrong with it, or None after the last one."""
+        try:
+            return self._video.read()
+        except FrameError as error:
+            return error
+
+
+def _early_s(frame: VideoFrame) -> float:
+    return TICK_FRACTION * min(frame.gap_s, TICK_S)
 
 
 class FolderFrames(PlayedFrames):
@@ -163,7 +168,7 @@ class FolderFrames(PlayedFrames):
             image = read_picture(self._files[index])
         except InputError as error:
             raise FrameError(str(error), "corrupt") from error
-        return Frame(image, now_ns, index)
+        return self._played(image, index, index / self._rate_hz, now_ns)
 
 
 class RecordingFrames(PlayedFrames):
@@ -195,7 +200,10 @@ class RecordingFrames(PlayedFrames):
         while self._waiting is not None and self._captured_ns(self._waiting) <= due_ns:
             latest, self._waiting = self._waiting, next(self._recorded, None)
             self._index += 1
-        return None if latest is None else Frame(decode(latest.message), now_ns, self._index - 1)
+        if latest is None:
+            return None
+        time_s = 1e-9 * (self._captured_ns(latest) - self._first_ns)
+        return self._played(decode(latest.message), self._index - 1, time_s, now_ns)
 
     def close(self) -> None:
         """Releases the file."""

@@ -34,6 +34,14 @@ class FrameError(RuntimeError):
         self.kind = kind
 
 
+class SourceError(FrameError, InputError):
+    """A source that cannot be opened; the message gives what was found and the remedy."""
+
+    def __init__(self, message: str, missing: bool = False) -> None:
+        InputError.__init__(self, message, missing)
+        self.kind = "missing" if missing else "source"
+
+
 class EndOfFrames(FrameError):  # noqa: N818 - an end is no error of the file
     """A recording has been played to its end."""
 

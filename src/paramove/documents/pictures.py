@@ -15,17 +15,21 @@ from paramove.documents.input_error import InputError
 
 MAX_PIXELS = 50_000_000
 """Limit for one picture: a header of a few bytes may claim more than memory holds."""
+AS_CAPTURED = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+"""Pixels as the sensor gives them, for which a lens is calibrated, whichever way up the camera was held."""
 PICTURE_BYTES = 256 * MEBIBYTE
 VIDEO_BYTES = 2**40
 JPEG = b"\xff\xd8"
 _PNG = b"\x89PNG\r\n\x1a\n"
 _NO_FRAME_HEADER = frozenset((0xC4, 0xC8, 0xCC))
 _TIFF = {b"II*\0": "<", b"MM\0*": ">"}
+_TIFF_WIDTH, _TIFF_HEIGHT, _TIFF_ORIENTATION = 256, 257, 274
+_UPRIGHT = 1
 _VIDEOS = (b"....ftyp", b"RIFF....AVI ", b"\x1aE\xdf\xa3", b"....moov", b"....mdat", b"....free", b"....wide")
 
 
 def decoded(data: bytes) -> NDArray[np.uint8]:
-    """BGR pixels [H, W, 3] of a PNG, JPEG, BMP, WebP or TIFF file.
+    """BGR pixels [H, W, 3] of a PNG, JPEG, BMP, WebP or TIFF file, as they are stored: not turned by an EXIF tag.
 
     Raises InputError with what is wrong with the data, without their source.
     """
@@ -34,8 +38,10 @@ def decoded(data: bytes) -> NDArray[np.uint8]:
         raise InputError("is no PNG, JPEG, BMP, WebP or TIFF: a whole JPEG or PNG expected")
     if width * height > MAX_PIXELS:
         raise InputError(f"claims {width} x {height} px, {MAX_PIXELS} px together allowed")
+    if data[:4] in _TIFF and (orientation := _tiff_tags(data)[_TIFF_ORIENTATION]) > _UPRIGHT:
+        raise InputError(f"is a TIFF of orientation {orientation}, by which OpenCV always turns it: a PNG expected")
     try:
-        image: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+        image: Any = cv2.imdecode(np.frombuffer(data, np.uint8), AS_CAPTURED)
     except cv2.error as error:
         raise InputError(f"cannot be decoded ({error.err}): a whole JPEG or PNG expected") from error
     if image is None:
@@ -65,7 +71,8 @@ def claimed_size(data: bytes) -> tuple[int, int]:
         elif data[:4] == b"RIFF" and data[8:12] == b"WEBP":
             width, height = _of_webp(data)
         elif data[:4] in _TIFF:
-            width, height = _of_tiff(data, _TIFF[data[:4]])
+            tags = _tiff_tags(data)
+            width, height = tags[_TIFF_WIDTH], tags[_TIFF_HEIGHT]
         else:
             return 0, 0
     except (struct.error, IndexError):  # the header is cut off
@@ -94,18 +101,22 @@ def _of_webp(data: bytes) -> tuple[int, int]:
     return width & 0x3FFF, height & 0x3FFF
 
 
-def _of_tiff(data: bytes, order: str) -> tuple[int, int]:
-    sizes = {256: 0, 257: 0}
+def _tiff_tags(data: bytes) -> dict[int, int]:
+    """Width, height and orientation by their tags; 0 of those that the first image of a TIFF does not have."""
+    order = _TIFF[data[:4]]
+    values = dict.fromkeys((_TIFF_WIDTH, _TIFF_HEIGHT, _TIFF_ORIENTATION), 0)
     begin = struct.unpack_from(order + "I", data, 4)[0]
     for number in range(struct.unpack_from(order + "H", data, begin)[0]):
         tag, kind, _ = struct.unpack_from(order + "HHI", data, begin + 2 + 12 * number)
-        if tag in sizes:
-            sizes[tag] = struct.unpack_from(order + ("H" if kind == 3 else "I"), data, begin + 10 + 12 * number)[0]
-    return sizes[256], sizes[257]
+        if tag in values:
+            values[tag] = struct.unpack_from(order + ("H" if kind == 3 else "I"), data, begin + 10 + 12 * number)[0]
+    return values
 
 
 def opened_video(path: Path, raising: type[InputError] = InputError) -> Any:
-    """A cv2.VideoCapture of an mp4, mov, avi, mkv or webm file with a sound frame rate and size.
+    """A cv2.VideoCapture, by FFmpeg, of an mp4, mov, avi, mkv or webm file with a sound size.
+
+    Its nominal frame rate may be anything: a browser's recording has none.
 
     Raises `raising` for everything else, also for playlists, which refer to other files.
     """
@@ -116,9 +127,10 @@ def opened_video(path: Path, raising: type[InputError] = InputError) -> Any:
     except OSError as error:
         raise raising(unreadable(path, error)) from error
     known = any(all(part in (ord("."), byte) for part, byte in zip(one, begin, strict=False)) for one in _VIDEOS)
-    capture: Any = cv2.VideoCapture(str(path) if known and len(begin) == 12 else "")
+    name = str(path.absolute()) if known and len(begin) == 12 else ""  # a relative "take:1.mp4" would be a protocol
+    capture: Any = cv2.VideoCapture(name, cv2.CAP_FFMPEG)
     pixels = capture.get(cv2.CAP_PROP_FRAME_WIDTH) * capture.get(cv2.CAP_PROP_FRAME_HEIGHT)
-    if not capture.isOpened() or not 0.1 <= capture.get(cv2.CAP_PROP_FPS) <= 1000.0 or not 1 <= pixels <= MAX_PIXELS:
+    if not capture.isOpened() or not 1 <= pixels <= MAX_PIXELS:
         capture.release()
         raise raising(
             f"{path} ({size} bytes) is no video that OpenCV can read, or is cut off: an mp4 or avi with frames of at "
