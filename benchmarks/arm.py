@@ -180,7 +180,7 @@ def stop_ms(description: RobotDescription, folder: Path, trials: int) -> list[fl
             here.arms()
             here.moves()
             begun_s = time.monotonic()
-            here.arm.on_stop(StopRequest(source="benchmark"), time.monotonic_ns())
+            here.arm.on_stop(StopRequest(source="benchmark"))
             times_ms.append(here.ramp_begins_ms(begun_s))
             wait(lambda: here.loop.driver.state is State.HOLD)
     return times_ms

@@ -12,12 +12,11 @@ Publishes   wire/hoap3/stream      StreamBatch            15 Hz while moving, jo
 """
 
 from pathlib import Path
-from typing import Any
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.robots import RobotDescription, RobotFolder, ThisLaunch
 from paramove.robots.hoap3 import batch_message, state_of
-from paramove.robots.streaming import ArmDriver
+from paramove.robots.streaming import ArmDriver, command_handlers
 
 SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.HOSTS_LINK, topics.WIRE_HOAP3_STATE)
 PUBLISHES = (topics.WIRE_HOAP3_STREAM, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
@@ -35,13 +34,12 @@ def run(bus: Bus, config: Config) -> None:
     launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
     robot, no_program = RobotDescription.load(config.robot), lambda: launch.why_no_program(bus.settings)
     driver = ArmDriver(robot, no_program=no_program, link_timeout_s=config.link_timeout_s)
-    handle: dict[topics.Topic, Any] = {topics.ARM_TRAJECTORY: driver.on_trajectory, topics.HOSTS_LINK: driver.on_link}
-    handle |= {topics.WIRE_HOAP3_STATE: lambda message, at_ns: driver.on_robot_state(state_of(message), at_ns)}
-    handle |= dict.fromkeys(topics.ARMINGS, driver.on_arm_request) | dict.fromkeys(topics.STOPS, driver.on_stop)
+    handle = command_handlers(driver)
+    handle[topics.WIRE_HOAP3_STATE] = lambda it: driver.on_robot_state(state_of(it.message), it.captured_ns)
     bus.ready(driver.detail)
     for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
-            handle[event.topic](event.message, event.captured_ns)
+            handle[event.topic](event)
             if event.topic not in topics.STOPS:
                 continue  # a stop does not wait for the next period
         output = driver.tick(bus.now_ns)

@@ -11,11 +11,10 @@ Publishes   arm/joint_states        foxglove.JointStates   15 Hz   rad
             arm/motors              MotorStatus            1 Hz
 """
 
-from typing import Any
-
 from paramove.bus import TICK_PERIOD_NS, Bus, NodeConfig, Tick, main, topics
 from paramove.robots import RobotFolder, ThisLaunch
 from paramove.robots.dynamixel import DrivenArm, ServoArmSetup
+from paramove.robots.streaming import command_handlers
 
 SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.HOSTS_LINK)
 JOINTS = (topics.ARM_JOINT_STATES, topics.ARM_JOINT_STATES_FAST)
@@ -35,14 +34,13 @@ def run(bus: Bus, config: Config) -> None:
     with config.driven_arm(bus.run_folder, launch, paced_in) as arm:
         bus.when_readable(arm.readable, lambda: publish_all(bus, arm))
         bus.ready(arm.detail)
-        handle: dict[topics.Topic, Any] = {topics.ARM_TRAJECTORY: arm.on_trajectory, topics.HOSTS_LINK: arm.on_link}
-        handle |= dict.fromkeys(topics.ARMINGS, arm.on_arm_request) | dict.fromkeys(topics.STOPS, arm.on_stop)
+        handle = command_handlers(arm)
         for event in bus.events(*SUBSCRIBES, tick=True):
             if isinstance(event, Tick):
                 arm.run_to(event.now_ns + TICK_PERIOD_NS)
                 publish_all(bus, arm)
             else:
-                handle[event.topic](event.message, event.captured_ns)
+                handle[event.topic](event)
             bus.degraded(arm.trouble) if arm.trouble else bus.ready(arm.detail)
 
 

@@ -71,3 +71,14 @@ def test_a_stop_counts_however_old():
     late = clock(100 * LARGEST_BOUND_NS)
     arrived(topics.OPERATOR_ESTOP, StopRequest(source="terminal"), late)
     arrived(topics.OPERATOR_ARM, ArmRequest(source="a person", armed=False, by_person=True), late)
+
+
+@pytest.mark.parametrize("seconds", [-(2**62), 0, 2**62])
+def test_a_stop_counts_from_when_it_comes_whatever_clock_is_there(seconds):
+    stop = StopRequest(source="terminal")
+    disarm = ArmRequest(source="a person", armed=False)
+    for topic, request in ((topics.OPERATOR_ESTOP, stop), (topics.OPERATOR_ARM, disarm)):
+        request.captured.seconds = seconds
+        envelope, message = arrived(topic, request, ClockOffset())
+        assert (envelope.published_ns, envelope.captured_ns) == (NOW_NS, NOW_NS)
+        assert message.captured.ToNanoseconds() == NOW_NS

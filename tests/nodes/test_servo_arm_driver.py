@@ -9,6 +9,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,9 +18,11 @@ from dynamixel_emulator.emulator import DynamixelEmulator
 from nodes import servo_arm_driver
 from paramove.bus import topics
 from paramove.bus.bus import Bus
+from paramove.bus.inspection import BusVisitor
+from paramove.bus.publisher import Publisher
 from paramove.bus.settings import BusSettings
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
-from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
+from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState, StopRequest
 from paramove.operator.terminal import request_arming, stop_arm
 from paramove.robots.description import RobotDescription
 from sim.emulated_arm import emulated_servos
@@ -166,6 +169,33 @@ def test_a_stop_by_a_topic_is_latched_and_its_source_may_end(run: Run, press) ->
     while (found := request_arming(run.folder, True, PATIENT_S)).state != SafetyState.STATE_ARMED:
         assert {fault.code for fault in found.faults} <= {"arming_slow", "arming_stale"}  # a busy machine
     assert run.goals() == rested
+
+
+@pytest.mark.parametrize("name", ["operator/stop", "operator/estop", "operator/stop_away"])
+@pytest.mark.parametrize("ahead_s", [-10_000, 10_000, 9_000_000_000])
+def test_a_stop_and_a_request_to_disarm_count_whatever_clock_their_sender_has(
+    run: Run, name: str, ahead_s: int
+) -> None:
+    """In a container, in a time namespace, on another host; each is published once."""
+    topic = topics.by_name(name)
+    with BusVisitor(run.folder, "button") as visitor:
+        stamped(visitor.publisher(topic), StopRequest(source="button"), ahead_s)
+        run.waits_for("HOLD")
+    assert [fault.code for fault in run.safety.faults] == ["person_stop"]
+    with BusVisitor(run.folder, "terminal") as visitor:
+        stamped(visitor.publisher(topics.OPERATOR_ARM), ArmRequest(source="terminal", armed=False), ahead_s)
+        run.waits_for("DISARMED")
+
+
+def stamped(publisher: Publisher, message: Any, ahead_s: int) -> None:
+    """Publishes it once somebody has subscribed, with the times of another clock."""
+    until_s = time.monotonic() + PATIENT_S
+    while not publisher.subscriptions:
+        publisher.serve()
+        assert time.monotonic() < until_s
+    there_ns = time.monotonic_ns() + ahead_s * 1_000_000_000
+    message.captured.seconds = there_ns // 1_000_000_000
+    publisher.publish(message, there_ns, there_ns)
 
 
 def test_a_movement_of_a_program_that_is_killed_is_played_to_its_end_and_nothing_after_it(run: Run) -> None:

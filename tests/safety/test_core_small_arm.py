@@ -161,6 +161,15 @@ def test_arm_words_that_come_too_often_do_not_arm_but_those_that_disarm_are_hear
     assert state is State.DISARMED
 
 
+@pytest.mark.parametrize("captured_ns", [-(2**63), 0, 2**63 - 1])
+def test_a_request_to_disarm_has_no_age_and_earlier_ones_to_arm_are_void(captured_ns: int) -> None:
+    arm = SmallArm()
+    arm.arm()
+    assert arm.step(word=ArmingRequest(captured_ns, "a person", False))[1] is State.DISARMED
+    assert arm.step(ms=1, word=ArmingRequest(arm.now, "a person", True, by_person=True))[1] is State.DISARMED
+    assert arm.arm()[1] is State.ARMED
+
+
 @pytest.mark.parametrize(
     "fields",
     [

@@ -43,6 +43,8 @@ class Received:
         captured_ns: Time at which the content was measured, ns of the bus clock.
         published_ns: When it was published.
         sequence: Of its publisher's epoch.
+        resent: Whether it is the last value of a latched topic, sent because this process has just found its publisher:
+            it may have been published at any time before.
     """
 
     topic: Topic
@@ -50,6 +52,7 @@ class Received:
     captured_ns: int
     published_ns: int
     sequence: int
+    resent: bool = False
 
 
 class Subscriber:
@@ -90,11 +93,13 @@ class Subscriber:
             ready: A poll has just shown that something is waiting, so that need not be checked again.
         """
         for _ in range(_SKIPPED_AT_ONCE):
+            epoch = self.counter.epoch
             raw = self.receive_raw(ready)
             ready = False
             if raw is None:
                 return None
             envelope, payload = raw
+            is_first = envelope.epoch != epoch
             try:
                 if not self._budget.admits(envelope.epoch, envelope.published_ns):
                     raise RejectedError(Reason.BUDGET, self._budget_message())
@@ -103,7 +108,8 @@ class Subscriber:
                 self.counter.messages -= 1
                 self._reject(error)
                 continue
-            return Received(self.topic, message, envelope.captured_ns, envelope.published_ns, envelope.sequence)
+            times = envelope.captured_ns, envelope.published_ns
+            return Received(self.topic, message, *times, envelope.sequence, envelope.is_welcome and is_first)
         return None
 
     def receive_raw(self, ready: bool = False) -> tuple[Envelope, bytes] | None:
@@ -209,7 +215,7 @@ class Subscriber:
         except (DecodeError, ValueError) as error:
             raise RejectedError(Reason.DECODE, f"payload is not a {self.topic.type_name}: {error}") from error
         unsound_number = unsound(message)
-        if unsound_number:
+        if unsound_number and not self.topic.is_request:
             raise RejectedError(Reason.NUMBER, f"{unsound_number}; finite numbers expected, correct the publisher")
         return message
 

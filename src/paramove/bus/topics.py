@@ -76,6 +76,14 @@ class Topic:
         return self.name.startswith("truth/")
 
     @property
+    def is_request(self) -> bool:
+        """Whether it carries requests to stop or to arm, which count whatever time their sender has written into them.
+
+        Their subscribers read no number of them. How old a request to arm is, the envelope has.
+        """
+        return self.type in (StopRequest, ArmRequest)
+
+    @property
     def is_image(self) -> bool:
         """Whether a message carries pixels, so that its queue is short and its size limit high."""
         return self.type in (RawImage, CompressedImage)

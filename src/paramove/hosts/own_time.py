@@ -33,9 +33,13 @@ def in_own_time(
     Raises:
         DecodeError: The payload is no message of the topic.
         UnknownTimeError: No reply has shown what time it is there; or a command to move or arm, and the clock's offset
-            is not known to `LARGEST_BOUND_NS`.
+            is not known to `LARGEST_BOUND_NS`. Never for a request to stop or to disarm, which has no age: its times
+            become the time here.
     """
     message = topic.type.FromString(payload)
+    if topic.is_request and not getattr(message, "armed", False):
+        message.captured.FromNanoseconds(now_ns)
+        return envelope._replace(published_ns=now_ns, captured_ns=now_ns), message
     bound_ns = clock.bound_ns(now_ns)
     moves = topic.type is topics.ARM_TRAJECTORY.type or (topic.type is topics.OPERATOR_ARM.type and message.armed)
     if bound_ns == float("inf") or (moves and bound_ns > LARGEST_BOUND_NS):

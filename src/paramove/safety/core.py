@@ -163,19 +163,14 @@ class SafetyCore:
     def _handle_request(
         self, now_ns: int, request: ArmingRequest, measured: Measured, inputs: Inputs
     ) -> Targets | None:
+        if not request.armed:  # whoever disarms is obeyed, whatever clock there is: only permission to move expires
+            return self._disarm(now_ns, measured, inputs)
         if request.captured_ns <= self._requests_after_ns:
             return None
         # One from the future must not shut out later ones.
         self._requests_after_ns = max(self._requests_after_ns, min(request.captured_ns, now_ns))
         too_often = self._requests.exceeded(now_ns)
-        if not request.armed:
-            if self.state is State.STOPPING:
-                self._disarm_after_stop = True
-            elif self.state is State.ARMED and self._moving(measured):
-                return self._stop(now_ns, None, inputs.proposal, measured)
-            else:
-                self.state = State.DISARMED
-        elif self.state in (State.DISARMED, State.HOLD):
+        if self.state in (State.DISARMED, State.HOLD):
             self.faults = (*inputs.arming_faults, *self._arming_faults(now_ns, inputs, request, measured))
             if too_often:
                 message = f"more arming requests than allowed: {self._requests.allowed} within 250 ms; wait"
@@ -184,6 +179,17 @@ class SafetyCore:
                 self.state = State.ARMED
                 self._accepted.clear()
                 self._played = max(0, measured.next_index)
+        return None
+
+    def _disarm(self, now_ns: int, measured: Measured, inputs: Inputs) -> Targets | None:
+        self._requests.exceeded(now_ns)  # counted, and never too many
+        self._requests_after_ns = max(self._requests_after_ns, now_ns)  # arming needs a request from after this one
+        if self.state is State.STOPPING:
+            self._disarm_after_stop = True
+        elif self.state is State.ARMED and self._moving(measured):
+            return self._stop(now_ns, None, inputs.proposal, measured)
+        else:
+            self.state = State.DISARMED
         return None
 
     def _arming_faults(self, now_ns: int, inputs: Inputs, request: ArmingRequest, measured: Measured) -> list[Fault]:

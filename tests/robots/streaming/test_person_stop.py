@@ -25,7 +25,7 @@ def test_the_tick_after_the_stop_begins_to_stop_and_the_arm_then_holds() -> None
     rig.send("one", GOAL, duration_s=2.0)
     for _ in range(8):
         rig.tick()
-    rig.driver.on_stop(PRESSED, rig.now_ns)
+    rig.driver.on_stop(PRESSED)
     output = rig.tick()
     assert output is not None
     assert output.safety.state == SafetyState.STATE_STOPPING
@@ -50,7 +50,7 @@ def test_pressed_again_it_changes_nothing() -> None:
     for _ in range(8):
         rig.tick()
     for _ in range(30):
-        rig.driver.on_stop(PRESSED, rig.now_ns)
+        rig.driver.on_stop(PRESSED)
         rig.tick()
     assert rig.driver.state is State.HOLD
     assert faults(rig) == [(PERSON_STOP, SENTENCE)]
@@ -58,16 +58,24 @@ def test_pressed_again_it_changes_nothing() -> None:
 
 def test_a_stop_from_before_the_driver_began_is_no_reason_for_how_it_stands() -> None:
     rig = Rig(no_program="")
-    pressed_ns = rig.now_ns
     rig.tick()
-    rig.driver.on_stop(PRESSED, pressed_ns)
+    rig.driver.on_stop(PRESSED, resent=True)
     rig.arm(by_person=False)
     assert rig.driver.state is State.DISARMED
     assert [code for code, _ in faults(rig)] == ["arming_program"]  # it was stopped all the same
     rig.arm()
     assert rig.driver.state is State.ARMED
-    rig.driver.on_stop(PRESSED, rig.now_ns)
+    rig.driver.on_stop(PRESSED)
     rig.tick()
+    assert faults(rig) == [(PERSON_STOP, SENTENCE)]
+
+
+def test_a_stop_that_is_sent_again_stops_an_arm_that_may_move() -> None:
+    """In doubt it is a new one: its publisher may have been found after it was published."""
+    rig = armed()
+    rig.driver.on_stop(PRESSED, resent=True)
+    rig.tick()
+    assert rig.driver.state is State.HOLD
     assert faults(rig) == [(PERSON_STOP, SENTENCE)]
 
 
@@ -75,7 +83,7 @@ def test_a_stop_from_before_the_driver_began_is_no_reason_for_how_it_stands() ->
 def test_pressed_before_it_is_armed_only_a_later_arm_word_arms(later: bool) -> None:
     rig = Rig()
     rig.tick()
-    rig.driver.on_stop(PRESSED, rig.now_ns)
+    rig.driver.on_stop(PRESSED)
     if later:
         rig.tick()
         assert rig.driver.state is State.HOLD
@@ -88,7 +96,7 @@ def test_a_stop_wins_against_a_disarm_word() -> None:
     rig.send("one", GOAL, duration_s=2.0)
     for _ in range(8):
         rig.tick()
-    rig.driver.on_stop(PRESSED, rig.now_ns)
+    rig.driver.on_stop(PRESSED)
     rig.arm(armed=False)
     for _ in range(20):
         rig.tick()
@@ -97,7 +105,7 @@ def test_a_stop_wins_against_a_disarm_word() -> None:
 
 def test_pressed_while_the_robot_is_silent_it_is_kept() -> None:
     rig = Rig()
-    rig.driver.on_stop(PRESSED, rig.now_ns)
+    rig.driver.on_stop(PRESSED)
     rig.driver.tick(rig.now_ns)
     assert rig.driver.state is State.DISCONNECTED
     rig.tick()

@@ -1,3 +1,5 @@
+from .commands import CommandedArm as CommandedArm
+from .commands import command_handlers as command_handlers
 from .driver import ArmDriver as ArmDriver
 from .driver import DriverOutput as DriverOutput
 from .stream import Frames as Frames

@@ -79,9 +79,10 @@ class ArmDriver:
         link_timeout_s: When commands come from another host: after so long without a reply from there the link counts
             as lost, which stops the robot, and nobody arms. None: there is no other host.
 
-    The driver begins with its first tick and ignores arming requests, stops and trajectories from before it. So a
-    restarted driver is disarmed, and what stopped an earlier one is not its reason; the stream's epoch is made of that
-    tick's time. After a stop from before it, too, only a person arms.
+    The driver begins with its first tick and ignores arming requests and trajectories from before it. So a restarted
+    driver is disarmed; the stream's epoch is made of that tick's time. A stop has no age: whatever time its sender has
+    written into it, it stops the robot. Only one that was sent again to a driver which has not been armed since it
+    began may have stopped an earlier one: it is not reported as a reason, but after it only a person arms.
     """
 
     def __init__(
@@ -110,7 +111,7 @@ class ArmDriver:
         self._arming_requests: list[ArmingRequest] = []
         self._trajectories: list[tuple[JointTrajectory, int]] = []
         self._stop: Fault | None = None
-        self._person_stops: list[tuple[int, Fault]] = []
+        self._person_stops: list[tuple[Fault, bool]] = []
         self._stopped_before = False
         self._arming_faults: tuple[Fault, ...] = ()
         self._checks_began_ns: int | None = None
@@ -125,7 +126,7 @@ class ArmDriver:
     def _begin_at(self, start_ns: int) -> None:
         d = self._description
         self._epoch = 1 + (start_ns // 1_000_000) % (2**32 - 1)
-        self._now_ns = self._began_ns = start_ns
+        self._now_ns = start_ns
         self._core = SafetyCore(
             self._limits, (d.lower, d.upper), self._epoch, start_ns, self._settings, self._clearance
         )
@@ -158,10 +159,15 @@ class ArmDriver:
         """Take the arming request of a person or, for an emulated robot, of a program."""
         self._arming_requests.append(ArmingRequest(captured_ns, message.source, message.armed, message.by_person))
 
-    def on_stop(self, message: StopRequest, captured_ns: int) -> None:
-        """Take a person's stop: the next `tick` begins a controlled stop and latches it, whatever the gate does."""
+    def on_stop(self, message: StopRequest, resent: bool = False) -> None:
+        """Take a person's stop: the next `tick` begins a controlled stop and latches it, whatever the gate does.
+
+        Args:
+            message: The request; its time does not count.
+            resent: Whether it was published before the driver had subscribed (see `Received.resent`).
+        """
         fault = Fault(PERSON_STOP, "", f"stopped from the {message.source or 'bus'} by a person")
-        self._person_stops.append((captured_ns, fault))
+        self._person_stops.append((fault, resent))
 
     def on_link(self, message: LinkState, captured_ns: int) -> None:
         """Take that the other hosts have answered a request that was sent at `captured_ns`."""
@@ -243,9 +249,9 @@ class ArmDriver:
         return DriverOutput(stream, joint_states, statuses, self._safety_state(now_ns))
 
     def _judge_stops(self) -> None:
-        """Latch stops; one from before this driver began stopped an earlier driver and is not its fault."""
-        for captured_ns, fault in self._person_stops:
-            if captured_ns < self._began_ns:
+        """Latch stops; one that was sent again to a driver that was never armed may have stopped an earlier one."""
+        for fault, resent in self._person_stops:
+            if resent and self._core.untouched:
                 self._stopped_before = True
             else:
                 self._stop = fault

@@ -169,7 +169,7 @@ def test_a_joint_that_jumps_stops_the_arm_and_its_angle_is_not_published(person)
 def test_a_stop_ends_the_movement_and_only_a_new_word_arms_again(person):
     person.arms_and_waits()
     person.moves()
-    person.arm.on_stop(StopRequest(source="page"), time.monotonic_ns())
+    person.arm.on_stop(StopRequest(source="page"))
     person.waits_for("HOLD")
     assert person.is_told("STOPPED").reason == "stopped from the page by a person"
     rested = person.goals()
@@ -427,7 +427,7 @@ def test_at_the_end_it_goes_to_rest_slowly_and_then_limp(emulator, monkeypatch):
 
 
 def stops(person):
-    person.arm.on_stop(StopRequest(source="page"), time.monotonic_ns())
+    person.arm.on_stop(StopRequest(source="page"))
     person.waits_for("HOLD")
 
 

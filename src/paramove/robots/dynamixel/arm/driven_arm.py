@@ -108,10 +108,10 @@ class DrivenArm:
         """Take that the other hosts reply; at once, whatever the loop is doing."""
         self._driver.on_link(message, captured_ns)
 
-    def on_stop(self, message: StopRequest, captured_ns: int) -> None:
-        """Take a person's stop: the stop ramp begins in the next period."""
+    def on_stop(self, message: StopRequest, resent: bool = False) -> None:
+        """Take a person's stop: the stop ramp begins in the next period. `resent`: see `ArmDriver.on_stop`."""
         with self._loop.lock:
-            self._driver.on_stop(message, captured_ns)
+            self._driver.on_stop(message, resent)
         self._loop.tick()
 
     def run_to(self, time_ns: int) -> None:
