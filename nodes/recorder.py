@@ -6,6 +6,7 @@ Subscribes  every topic that the topic table marks as recorded
 """
 
 from paramove.bus import Bus, NodeConfig, Received, main, topics
+from paramove.documents import FileName
 from paramove.recording import Recorder
 
 SUBSCRIBES = topics.RECORDED
@@ -17,7 +18,7 @@ REPORT_EVERY = 1500
 class Config(NodeConfig):
     """`file`: name of the recording in the run's folder."""
 
-    file: str = "recording.mcap"
+    file: FileName = "recording.mcap"
 
 
 def run(bus: Bus, config: Config) -> None:

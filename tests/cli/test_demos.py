@@ -185,3 +185,21 @@ def test_wrong_arguments_of_import(csv, tmp_path):
         assert run("import", csv, *to, "--unit", "mm", *wrong).exit_code == 2
     assert run("label", tmp_path, "--recording", "a", "--action", "x").exit_code == 2
     assert not (tmp_path / "set").exists()
+
+
+PATHS = ("../../outside", "/tmp/outside", "a/b", "..", "a\nb", "a" * 300)
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_a_name_that_is_a_path_is_rejected_at_import_and_labelling(csv, tmp_path, name):
+    folder = tmp_path / "deep" / "set"
+    rejected(78, "import", csv, "--to", folder, "--unit", "mm", "--action", name)
+    assert not folder.exists()
+    good("import", csv, "--to", folder, "--unit", "mm")
+    before = sorted(tmp_path.rglob("*"))
+    take = ("label", folder, "--recording", "take.mcap", "--action", name)
+    rejected(78, *take, "--start", 0.2, "--end", 1.5)
+    rejected(78, *take, "--find")
+    rejected(78, "label", folder, "--recording", name, "--action", "reaching", "--find")
+    rejected(78, "label", folder, "--recording", name, "--action", "reaching", "--start", 0.2, "--end", 1.5)
+    assert sorted(tmp_path.rglob("*")) == before

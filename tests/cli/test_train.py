@@ -122,6 +122,20 @@ def test_refusals(trained, tmp_path):
     )
 
 
+@pytest.mark.parametrize("name", ["../../outside", "/tmp/outside", "..", "a" * 300])
+def test_an_action_whose_name_is_a_path_is_rejected_before_training(trained, tmp_path, monkeypatch, name):
+    work = tmp_path / "deep" / "work"
+    (work / "set").mkdir(parents=True)
+    for file in trained.table.iterdir():
+        (work / "set" / file.name).write_bytes(file.read_bytes())
+    labels = work / "set" / "labels.yaml"
+    labels.write_text(labels.read_text().replace("action: reaching", f"action: {name}"))
+    monkeypatch.chdir(work)
+    before = sorted(tmp_path.rglob("*"))
+    assert "labels.yaml:" in rejected(78, "set", "--leave-out", "none", *QUICK)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
 def test_one_theta_teaches_no_dependence(tmp_path):
     assert call("demos", "synthesize", tmp_path / "one", "--columns", 1, "--rows", 1).exit_code == 0
     said = rejected(78, tmp_path / "one", "--out", tmp_path / "a.npz")

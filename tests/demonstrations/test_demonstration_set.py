@@ -11,11 +11,13 @@ from numpy.testing import assert_allclose
 
 from paramove.demonstrations.demonstration_set import DemonstrationSet
 from paramove.demonstrations.movement import DemonstrationError, Movement
+from paramove.documents import name_fault
 from paramove.phmm import InterpolativePHMM
 from tests.demonstrations.movements import POINTS, TARGET, a_set, movement
 
 NUMBERS = st.floats(-10.0, 10.0, allow_nan=False, width=64)
 TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=("C", "Z")), min_size=1, max_size=12)
+NAMES = TEXTS.filter(lambda text: not name_fault(text))
 
 
 @st.composite
@@ -27,7 +29,7 @@ def any_movement(draw):
         positions=draw(arrays(np.float64, (count, 2, 3), elements=NUMBERS)),
         point_names=("wrist", "index"),
         frame="somewhere",
-        action=draw(TEXTS),
+        action=draw(NAMES),
         theta=draw(arrays(np.float64, 2, elements=NUMBERS)),
         parameter_names=("u", "v"),
         subject=draw(TEXTS),

@@ -28,6 +28,13 @@ def segment(**changes):
     return Segment(**({"recording": "a.mcap", "start": 0.4, "end": 1.4, "action": "reach"} | changes))
 
 
+@pytest.mark.parametrize("name", ["../a.mcap", "/tmp/a.mcap", "..", "b/a.mcap", f"{'a' * 300}.mcap"])
+def test_a_recording_is_never_written_outside_its_folder(tmp_path, name):
+    with pytest.raises(DemonstrationError):
+        a_recording(tmp_path / "set", name)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_there_and_back_are_two_movements():
     time, positions = there_and_back()
     found = movements_by_speed(time, positions, POINTS)

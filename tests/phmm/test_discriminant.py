@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ from numpy.testing import assert_allclose
 
 from paramove.documents import InputError
 from paramove.hmm import resample
-from paramove.phmm import LinearPHMM, ModelFileError, MovementClassifier
+from paramove.phmm import INDEX_FILE, LinearPHMM, ModelFileError, MovementClassifier
 from paramove.phmm.discriminant import WHOLE, Discriminant, discriminant_features
+from paramove.phmm.storage import read_record, write_record
 from paramove.training.examining import Examiner
 from tests.phmm.movements import FEW, shown
 
@@ -79,6 +81,21 @@ def test_actions_with_and_without_theta_compete(tmp_path: Path) -> None:
     (tmp_path / "reach.model.npz").unlink()
     with pytest.raises(ModelFileError):
         MovementClassifier.load(tmp_path)
+
+
+def test_an_action_whose_name_is_a_path_is_neither_written_nor_read(tmp_path: Path) -> None:
+    sequences, theta = shown(0)
+    classifier = MovementClassifier(LinearPHMM(8, options=FEW)).fit(sequences, theta, ["reach"] * len(sequences))
+    classifier.save(tmp_path / "models")
+    record = read_record(tmp_path / "models" / INDEX_FILE)
+    foreign = replace(record, parameters={**record.parameters, "actions": ["../models/reach"]})
+    write_record(tmp_path / "models" / INDEX_FILE, foreign)
+    with pytest.raises(ModelFileError, match="no '/'"):
+        MovementClassifier.load(tmp_path / "models")
+    classifier.models_ = {"../reach": classifier.models_["reach"]}
+    with pytest.raises(InputError, match="no '/'"):
+        classifier.save(tmp_path / "new")
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_theta_that_is_missing_once_is_named() -> None:

@@ -18,6 +18,7 @@ from typing import Any
 import zmq
 
 from paramove.bus.monitor import ForeignConnections
+from paramove.documents import checked_name
 
 PATH_BYTES = 107
 """Longest path of a Unix socket on Linux."""
@@ -32,8 +33,11 @@ class TopicTakenError(Exception):
 
 
 def socket_path(folder: Path, name: str) -> Path:
-    """Path of the socket of the topic or service `name`; raises BusFolderError if it is too long for a socket."""
-    path = folder / name.replace("/", ".")
+    """Path of the socket of the topic or service `name`.
+
+    Raises InputError for a name that no file can have, BusFolderError for a path that is too long for a socket.
+    """
+    path = folder / checked_name(name.replace("/", "."), "topic")
     size = len(os.fsencode(path))
     if size > PATH_BYTES:
         raise BusFolderError(

@@ -10,6 +10,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from paramove.bus.topics import Topic
+from paramove.documents import checked_name
 
 
 def default_folder(domain: str | None = None) -> Path:
@@ -17,8 +18,10 @@ def default_folder(domain: str | None = None) -> Path:
 
     Args:
         domain: Default: $PARAMOVE_DOMAIN, else "default".
+
+    Raises InputError for a domain that cannot be the name of a folder.
     """
-    domain = domain or os.environ.get("PARAMOVE_DOMAIN") or "default"
+    domain = checked_name(domain or os.environ.get("PARAMOVE_DOMAIN") or "default", "domain")
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     if runtime.startswith("/") and os.access(runtime, os.W_OK | os.X_OK):
         return Path(runtime) / "paramove" / domain

@@ -23,7 +23,7 @@ from paramove.cli.movement_options import (
     words,
 )
 from paramove.cli.output import JsonOption, ended, list_of, one_line, table_of
-from paramove.documents import exit_codes, printable
+from paramove.documents import checked_name, exit_codes, printable
 
 if TYPE_CHECKING:
     from paramove.demonstrations import DemonstrationSet
@@ -204,6 +204,7 @@ def label(
     with one_line():
         file = folder / FILE_NAME
         there = list(load_labels(file).file.segments) if file.exists() else []
+        checked_name(recording, "recording")
         times = _found_in(folder / recording, point) if find else [(start or 0.0, end or 0.0)]
         added: list[Segment] = []
         for first, last in times:

@@ -15,7 +15,7 @@ from rich.progress import Progress, TaskID
 from paramove.cli.evaluation_io import PROGRESS
 from paramove.cli.movement_options import SetArgument, words
 from paramove.cli.output import JsonOption, ended, one_line
-from paramove.documents import InputError, exit_codes, printable
+from paramove.documents import InputError, checked_name, exit_codes, printable
 from paramove.training import DEFAULT_FRAMES, DEFAULT_STATES, Kind
 
 if TYPE_CHECKING:
@@ -97,8 +97,8 @@ def _goal(out: Path | None, folder: Path, examples: Examples) -> Path:
             param_hint="--out",
         )
     if several:
-        return out or FOLDER / folder.resolve().name
-    name = f"{examples.actions[0]}.npz"
+        return out or FOLDER / checked_name(folder.resolve().name, "demonstration set")
+    name = f"{checked_name(examples.actions[0], 'action')}.npz"
     if out is None:
         return FOLDER / name
     return out if out.suffix == ".npz" else out / name

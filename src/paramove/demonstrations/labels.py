@@ -19,6 +19,7 @@ from paramove.demonstrations.movement import DemonstrationError
 from paramove.documents import (
     Document,
     DocumentError,
+    FileName,
     KeyPath,
     checked,
     raise_any,
@@ -65,12 +66,12 @@ Word = Annotated[str, Field(min_length=1, max_length=80)]
 class Segment(_Checked):
     """One movement in a recording."""
 
-    recording: Annotated[str, Field(min_length=1, max_length=200)] = Field(
-        description="file in the folder of labels.yaml"
-    )
+    recording: FileName = Field(description="file in the folder of labels.yaml")
     start: float = Field(ge=0.0, description="s from the first pose of the recording; the first frame of the movement")
     end: float = Field(gt=0.0, description="s; the last frame of the movement")
-    action: Word = Field(description="what is done, such as reaching")
+    action: Annotated[FileName, Field(max_length=80)] = Field(
+        description="what is done, such as reaching; a model is named after it"
+    )
     theta: list[float] = Field(
         default_factory=list, description="the movement's parameters, as `parameters` names them"
     )
@@ -152,9 +153,6 @@ def _contradictions(labels: Labels) -> list[DocumentError]:
         if len(segment.theta) != len(names):
             message = f"theta has {len(segment.theta)} components; 'parameters' names {len(names)}: {', '.join(names)}"
             findings.append(labels.error(index, message, "theta"))
-        if (Path(segment.recording).is_absolute()) or ".." in Path(segment.recording).parts:
-            message = f"{segment.recording!r}: expected a file in the folder of {FILE_NAME}; copy it there"
-            findings.append(labels.error(index, message, "recording"))
         key = (segment.recording, segment.start, segment.end, segment.action, segment.side)
         first = first_index.setdefault(key, index)
         if first != index:

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, append_segments, load_labels, write_labels
 from paramove.demonstrations.movement import DemonstrationError, Movement, Side
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, write_poses
-from paramove.documents import Floats, findings
+from paramove.documents import Floats, checked_name, findings
 
 LIBRARY = "paramove demonstrations"
 BETWEEN_NS = 2 * BILLION
@@ -76,7 +76,8 @@ def write_set(
 ) -> None:
     """Writes recordings and labels; with `add` to an existing set, whose labels.yaml keeps its comments.
 
-    Raises DemonstrationError if there is a set or a recording already, or if parameters differ from those of the set.
+    Raises DemonstrationError if there is a set or a recording already, if parameters differ from those of the set, or
+    if the name of a recording or an action cannot be that of a file.
     """
     there = (folder / FILE_NAME).exists()
     _reject(folder, takes, parameter_names, there, add)
@@ -117,6 +118,7 @@ def _reject(folder: Path, takes: Sequence[Take], parameter_names: Sequence[str],
                 f"{', '.join(labelled[0].point_names)}; choose those that all have with --point or --mapping"
             )
     for name in {take.recording for take in takes}:
+        checked_name(name, "recording", DemonstrationError)
         for file in (folder / name, folder / f"{name}.part"):
             if file.exists():
                 raise DemonstrationError(f"{file} exists; recordings are never overwritten: give another --name")

@@ -17,6 +17,11 @@ from .files import read_text as read_text
 from .files import size_of as size_of
 from .files import unreadable as unreadable
 from .input_error import InputError as InputError
+from .names import FileName as FileName
+from .names import Identifier as Identifier
+from .names import checked_name as checked_name
+from .names import is_identifier as is_identifier
+from .names import name_fault as name_fault
 from .old_names import OldNames as OldNames
 from .old_names import renamed_attribute as renamed_attribute
 from .pictures import JPEG as JPEG

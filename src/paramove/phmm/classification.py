@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp
 
-from paramove.documents import Floats, renamed_attribute
+from paramove.documents import Floats, InputError, checked_name, renamed_attribute
 from paramove.hmm import checked_sequence, checked_sequences, not_fitted
 from paramove.phmm.discriminant import Discriminant, discriminant_for, discriminants
 from paramove.phmm.estimates import ParameterEstimate
@@ -156,12 +156,16 @@ class MovementClassifier:
         return self
 
     def save(self, folder: str | Path) -> None:
-        """Write a folder with a model file per action, each usable alone, and an index."""
+        """Write a folder with a model file per action, each usable alone, and an index.
+
+        Raises InputError, and writes nothing, for the name of an action that no file can have.
+        """
         self._check_trained()
         path = Path(folder)
+        files = {action: path / _file_name(action) for action in self.models_}
         path.mkdir(parents=True, exist_ok=True)
         for action, model in self.models_.items():
-            model.save(path / _file_name(action))
+            model.save(files[action])
         arrays: dict[str, Floats] = {}
         for number, one in enumerate(self._discriminants):
             arrays |= one.arrays(number)
@@ -181,7 +185,8 @@ class MovementClassifier:
         classifier = cls()
         classifier.classes_ = tuple(sorted(actions))
         with_theta = [action for action in classifier.classes_ if action not in without]
-        classifier.models_ = {action: ParametricHMM.load(path / _file_name(action)) for action in with_theta}
+        files = {action: path / _file_name(action, ModelFileError) for action in with_theta}
+        classifier.models_ = {action: ParametricHMM.load(file) for action, file in files.items()}
         try:
             classifier._discriminants = tuple(
                 Discriminant.from_arrays(record.arrays, number, len(actions))
@@ -225,7 +230,5 @@ def _are_names(value: object) -> TypeGuard[tuple[str, ...]]:
     return isinstance(value, tuple) and all(isinstance(one, str) for one in value)
 
 
-def _file_name(action: str) -> str:
-    if not action or not all(letter.isalnum() or letter in " _-." for letter in action) or action.startswith("."):
-        raise ValueError(f"the name of an action that is saved has letters, digits, ' _-.' only, found {action!r}")
-    return f"{action}.model.npz"
+def _file_name(action: str, raising: type[InputError] = InputError) -> str:
+    return f"{checked_name(action, 'action', raising)}.model.npz"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from paramove.documents import (
     Position,
     checked,
     exit_codes,
+    is_identifier,
     nearest,
     raise_any,
     read_mapping,
@@ -29,7 +29,6 @@ from paramove.workspace import Workspace
 
 _MODULE = "names joined by dots, such as nodes.camera"
 _PATTERNS = {"module": _MODULE, "after_run": _MODULE, "": "a name such as my_node"}
-_PLAIN_NAME = re.compile(r"[a-z][a-z0-9_]*")
 _FOLDER = Path("launch")
 SERVO_ARM = "servo_arm"
 """Overlay of a launch file for arms of servos."""
@@ -107,7 +106,7 @@ def _with_overlays(
             raise document.error(("default_overlays",), f"expected a list of names of overlays, found {chosen!r:.80}")
         for index, overlay in enumerate(chosen):
             key_path = ("default_overlays", str(index))
-            if not _PLAIN_NAME.fullmatch(overlay):
+            if not is_identifier(overlay):
                 message = f"{overlay!r}: expected the plain name of an overlay in {folders[-1]}, no path"
                 findings.append(document.error(key_path, message))
             elif not (path := _named(workspace, folders, overlay)).is_file():
@@ -303,7 +302,7 @@ def _typed(workspace: Workspace, folders: Sequence[Path], name: str, kind: str) 
     """File of a launch file or overlay named on the command line; raises LaunchFileMissingError."""
     if name.endswith(".yaml"):
         path = Path(name)
-    elif _PLAIN_NAME.fullmatch(name):
+    elif is_identifier(name):
         path = _named(workspace, folders, name)
     else:
         raise LaunchFileMissingError(

@@ -13,10 +13,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.json_schema import GenerateJsonSchema
 
+from paramove.documents import Identifier
+
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 FILES = {"launch": "launch.schema.json", "overlay": "overlay.schema.json"}
 """Kind of file -> its schema in the folder of the launch files."""
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
 Module = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*(\.[A-Za-z_]\w*)*$", max_length=200)]
 Seconds = Annotated[float, Field(ge=0.0, le=86_400.0)]
 
@@ -62,7 +63,7 @@ class NodeSettings(_Checked):
     module: Module = Field(description="Python module that is started, such as nodes.camera")
     parameters: dict[str, Any] = Field(default_factory=dict, description="checked by the node's own Config")
     remaps: dict[str, str] = Field(default_factory=dict, description="topic name in the node: topic name on the bus")
-    host: Name | None = Field(default=None, description="where it runs; null: on the host without `ssh`")
+    host: Identifier | None = Field(default=None, description="where it runs; null: on the host without `ssh`")
     restart: Literal["never", "on-failure", "always"] = Field(
         default="never", description="reaction to its end: none; a restart after a failure; a restart in any case"
     )
@@ -71,7 +72,7 @@ class NodeSettings(_Checked):
         default=RestartBudget(), description="how often it is restarted before it is given up"
     )
     required: bool = Field(default=True, description="the run fails when this node ends before the run does")
-    after: list[Name] = Field(default_factory=list, description="started when these nodes are ready")
+    after: list[Identifier] = Field(default_factory=list, description="started when these nodes are ready")
     ready_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = Field(
         default=30.0, description="a node that is not ready within this time after its start has failed"
     )
@@ -118,10 +119,10 @@ class LaunchFile(_Checked):
 
     description: str = Field(default="", description="what the application does, for people")
     bus: BusSettings = Field(default=BusSettings(), description="clock and lockstep")
-    hosts: dict[Name, HostSettings] = Field(
+    hosts: dict[Identifier, HostSettings] = Field(
         default_factory=dict, description="computers of the run by their names, one of them without `ssh`"
     )
-    nodes: dict[Name, NodeSettings] = Field(min_length=1, description="name of the node: how it runs")
+    nodes: dict[Identifier, NodeSettings] = Field(min_length=1, description="name of the node: how it runs")
     default_overlays: list[str] = Field(default_factory=list, description="overlays applied without --with")
     seed_parameters: list[str] = Field(default_factory=list, description="node.parameter that --seed sets")
     connections: list[str] = Field(
@@ -129,7 +130,7 @@ class LaunchFile(_Checked):
         description="node.parameter that selects the hardware: --set accepts it only with an overlay, named by "
         "--with, that sets it",
     )
-    needs: dict[Name, NeededFile] = Field(
+    needs: dict[Identifier, NeededFile] = Field(
         default_factory=dict, description="files that must be there; a terminal offers to make missing ones, in order"
     )
     headless: dict[str, Any] = Field(default_factory=dict, description="node.parameter: value that --headless sets")

@@ -10,7 +10,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from paramove.documents import replacing
+from paramove.documents import checked_name, replacing
 from paramove.supervision.launch_file import Launch
 
 
@@ -50,11 +50,11 @@ class RunFolder:
 
     def log(self, node: str) -> Path:
         """File with the node's standard output and standard error."""
-        return self.logs / f"{node}.log"
+        return self.logs / f"{checked_name(node, 'node')}.log"
 
     def config(self, node: str) -> Path:
         """File that the node gets as `--config`."""
-        return self.nodes / f"{node}.yaml"
+        return self.nodes / f"{checked_name(node, 'node')}.yaml"
 
     @property
     def events(self) -> Path:

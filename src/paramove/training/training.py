@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from paramove.documents import replacing
+from paramove.documents import checked_name, replacing
 from paramove.phmm import MovementClassifier, ParametricHMM
 from paramove.training.examples import Examples
 from paramove.training.kinds import kind_of
@@ -83,8 +83,11 @@ def train_and_write(examples: Examples, make: Mapping[str, Make], goal: Path) ->
         make: gives the untrained model of each.
         goal: file or folder. Files appear when they are complete.
 
-    Raises ValueError for examples that do not fit, OSError if nothing can be written.
+    Raises ValueError for examples that do not fit, InputError for an action whose name cannot be that of a file,
+    OSError if nothing can be written.
     """
+    for action in examples.actions:
+        checked_name(action, "action")
     began_s = time.perf_counter()
     if len(examples.actions) == 1:
         (one,) = make.values()
