@@ -31,7 +31,7 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the robot then comes to rest by the stop ramp that it already has."""
-    launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
+    launch = ThisLaunch.of(bus.settings)
     robot, no_program = RobotDescription.load(config.robot), lambda: launch.why_no_program(bus.settings)
     driver = ArmDriver(robot, no_program=no_program, link_timeout_s=config.link_timeout_s)
     handle = command_handlers(driver)

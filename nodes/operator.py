@@ -6,9 +6,8 @@ Publishes   operator/arm_at_start   ArmRequest    until armed, latched
 
 from pydantic import field_validator
 
-from paramove.bus import Bus, NodeConfig, main, topics
+from paramove.bus import Bus, NodeConfig, is_first_start, main, topics
 from paramove.operator import REAL_ROBOT, Operator
-from paramove.robots import started_before
 
 SUBSCRIBES = (topics.ARM_SAFETY,)
 PUBLISHES = (topics.OPERATOR_ARM_AT_START,)
@@ -30,7 +29,7 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes."""
-    operator = Operator(config.arms_at_start, config.arms_at_start and started_before(bus.run_folder, bus.node))
+    operator = Operator(config.arms_at_start, config.arms_at_start and not is_first_start())
     bus.ready(operator.detail)
     for received in bus.latest(topics.ARM_SAFETY):
         request = operator.update(received.message, bus.now_ns)

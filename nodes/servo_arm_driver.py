@@ -29,7 +29,7 @@ class Config(NodeConfig, ServoArmSetup):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the arm then comes to rest."""
-    launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
+    launch = ThisLaunch.of(bus.settings)
     paced_in = bus.settings.folder if bus.settings.lockstep else None
     with config.driven_arm(bus.run_folder, launch, paced_in) as arm:
         bus.when_readable(arm.readable, lambda: publish_all(bus, arm))

@@ -2,13 +2,20 @@
 
 from pathlib import Path
 
+import pytest
+
 from nodes import operator
-from paramove.bus import topics
+from paramove.bus import START_VARIABLE, topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Received
 from paramove.msgs.safety_state_pb2 import SafetyState
 
 SECOND = 1_000_000_000
+
+
+@pytest.fixture(autouse=True)
+def started_once(monkeypatch):
+    monkeypatch.setenv(START_VARIABLE, "1")
 
 
 def replayed(folder: Path, arms_at_start: bool, *states: SafetyState.State) -> RecordedBus:
@@ -40,10 +47,11 @@ def test_does_not_arm_unless_told(tmp_path: Path) -> None:
     assert bus.states == [("ready", "does not arm")]
 
 
-def test_a_new_process_in_the_same_run_does_not_arm_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("start", ["2", ""])
+def test_a_new_process_in_the_same_run_does_not_arm_again(tmp_path: Path, monkeypatch, start) -> None:
     disarmed = SafetyState.STATE_DISARMED
-    assert replayed(tmp_path, True, SafetyState.STATE_DISCONNECTED).published == []  # restarted before it asked
-    bus = replayed(tmp_path, True, disarmed, disarmed, disarmed)
+    monkeypatch.setenv(START_VARIABLE, start)
+    bus = replayed(tmp_path, True, SafetyState.STATE_DISCONNECTED, disarmed, disarmed, disarmed)
     assert bus.published == []
     (state,) = bus.states
     assert state[0] == "ready"

@@ -1,6 +1,7 @@
 """One process and all that it starts."""
 
 import os
+import shutil
 import sys
 import threading
 from pathlib import Path
@@ -8,7 +9,10 @@ from pathlib import Path
 import pytest
 
 from paramove.documents.wording import printable
-from paramove.supervision.processes import Guard, SupervisedProcess, last_lines
+from paramove.supervision.launch_schema import NodeSettings
+from paramove.supervision.processes import Guard, SupervisedProcess, last_lines, node_process
+from paramove.supervision.run_folder import RunFolder
+from paramove.workspace import Workspace
 from tests.supervision.conftest import until
 
 
@@ -54,6 +58,18 @@ def test_children_left_behind_are_killed(guard, tmp_path):
     assert exit_code(started(guard, tmp_path, source, log=log)) == 0
     child = int(last_lines(log, 1)[0])
     until(lambda: not os.path.exists(f"/proc/{child}") or state_of(child) == "Z", "the child has ended")
+
+
+def test_a_node_knows_from_the_launcher_that_it_was_started_before(guard, tmp_path):
+    """Whatever is deleted in the run's folder."""
+    (tmp_path / "which.py").write_text("from paramove.bus import is_first_start; print(is_first_start())")
+    workspace, settings = Workspace((tmp_path,)), NodeSettings(module="which")
+    run_folder = RunFolder(tmp_path / "run")
+    for number, expected in enumerate(("True", "False", "False")):
+        run_folder.logs.mkdir(parents=True)
+        assert exit_code(node_process("driver", settings, run_folder, workspace, guard)) == 0, number
+        assert last_lines(run_folder.log("driver"), 1) == [expected]
+        shutil.rmtree(run_folder.path)
 
 
 def state_of(pid):

@@ -27,7 +27,9 @@ from .log_format import is_logged as is_logged
 from .log_format import parse as parse
 from .monitor import ForeignConnections as ForeignConnections
 from .monitor import can_read as can_read
+from .node import START_VARIABLE as START_VARIABLE
 from .node import NodeConfig as NodeConfig
+from .node import is_first_start as is_first_start
 from .node import main as main
 from .node import publish_each as publish_each
 from .node import read_node_file as read_node_file

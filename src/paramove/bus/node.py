@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import os
 import signal
 import sys
 from collections.abc import Callable, Iterable, Sequence
@@ -33,6 +34,8 @@ from paramove.documents import InputError, OldNames, exit_codes, findings, read_
 
 _log = logging.getLogger(__name__)
 
+START_VARIABLE = "PARAMOVE_NODE_START"
+"""In the environment of a node: how often the launcher has started it in this run, this time included."""
 LAST_STATUS_TIMEOUT_S = 1.0
 """How long a node that has failed waits for a subscriber to receive the reason."""
 
@@ -59,6 +62,15 @@ Config = TypeVar("Config", bound=NodeConfig)
 
 class ConfigurationError(InputError):
     """The node's file is missing or wrong; the text is printed for the user."""
+
+
+def is_first_start() -> bool:
+    """Whether the launcher has started this process's node for the first time in its run.
+
+    The launcher counts the starts itself, so that no deleted file makes a restarted node a new one. False where no
+    launcher has started the process.
+    """
+    return os.environ.get(START_VARIABLE) == "1"
 
 
 def read_node_file(path: Path, config_type: type[Config]) -> tuple[NodeFile, Config]:

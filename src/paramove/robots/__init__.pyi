@@ -15,7 +15,6 @@ from .pose_points import POINT_NAMES as POINT_NAMES
 from .pose_points import arm_points as arm_points
 from .this_launch import RESTARTED as RESTARTED
 from .this_launch import ThisLaunch as ThisLaunch
-from .this_launch import started_before as started_before
 from .working_surface import AROUND_SERVO_ARM as AROUND_SERVO_ARM
 from .working_surface import SurfaceParameters as SurfaceParameters
 from .working_surface import WorkingSurface as WorkingSurface

@@ -6,15 +6,13 @@ pseudo-terminal, who owns a topic.
 
 from __future__ import annotations
 
-import contextlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
-import psutil
-
-from paramove.bus import BusSettings, lock_of, owner_of, socket_path, topics
+from paramove.bus import BusSettings, is_first_start, lock_of, owner_of, socket_path, topics
 from paramove.devices import opened_files, serving
+from paramove.robots.emulator_process import why_no_emulator
 
 PSEUDO_TERMINALS = Path("/dev/pts")
 SERIAL_PORTS = "/dev/tty"
@@ -35,18 +33,18 @@ class ThisLaunch:
     restarted: bool = False
 
     @classmethod
-    def of(cls, settings: BusSettings, run_folder: Path, node: str) -> ThisLaunch:
-        """That of a node: its parent is the launcher if it holds the lock of the bus folder."""
+    def of(cls, settings: BusSettings) -> ThisLaunch:
+        """That of this process: its parent is the launcher if it holds the lock of the bus folder."""
         parent = os.getppid()
         if str(lock_of(settings.folder.resolve())) not in opened_files(parent).values():
             return cls()
-        return cls(parent, started_before(run_folder, node))
+        return cls(parent, not is_first_start())
 
     def why_not_servos(self, port: Path) -> str:
         """Why a serial port does not lead to servos that this launch emulates; "" if it does.
 
-        It does if the port is a pseudo-terminal whose other end is held by processes of this launch alone, and by none
-        that has a real serial port open, to which it could hand on.
+        It does if the port is a pseudo-terminal whose other end is held by emulators alone that this launch has
+        started, and by none that has a real serial port open, to which it could pass on what it receives.
         """
         device = port.resolve()
         if self.launcher is None:
@@ -57,8 +55,8 @@ class ThisLaunch:
         if not servers:
             return f"no process holds the other end of {device}"
         for server in servers:
-            if not self._has_started(server.pid):
-                return f"{server} at the other end of {device} does not belong to this launch"
+            if reason := self._why_no_emulator(server.pid):
+                return f"{server} at the other end of {device} {reason}"
             if any(_is_serial_port(name) for name in opened_files(server.pid).values()):
                 return f"{server} at the other end of {device} has a serial port open"
         return ""
@@ -66,7 +64,8 @@ class ThisLaunch:
     def why_no_program(self, settings: BusSettings) -> str:
         """Why no program may arm HOAP-3: this launch does not simulate it, or has restarted its driver.
 
-        It is simulated if the process that publishes its state belongs to this launch and makes the time of the run.
+        It is simulated if the process that publishes its state is a simulator that this launch has started, and makes
+        the time of the run.
         """
         if self.launcher is None or self.restarted:
             return RESTARTED if self.restarted else BY_HAND
@@ -74,21 +73,11 @@ class ThisLaunch:
         robot, clock = (owner_of(socket_path(settings.folder, name)) for name in names)
         if robot is None or robot != clock:
             return f"the process that publishes {names[0]} does not publish {names[1]}, as a simulator does"
-        return "" if self._has_started(robot) else f"pid {robot}, which publishes {names[0]}, is not of this launch"
+        reason = self._why_no_emulator(robot)
+        return f"pid {robot}, which publishes {names[0]}, {reason}" if reason else ""
 
-    def _has_started(self, pid: int) -> bool:
-        with contextlib.suppress(psutil.Error):  # it has just ended, or is not ours to look into
-            return self.launcher in (pid, *(one.pid for one in psutil.Process(pid).parents()))
-        return False
-
-
-def started_before(run_folder: Path, node: str) -> bool:
-    """Whether a node was started before in a run; from now on it was. Raises OSError if that cannot be written."""
-    try:
-        (run_folder / f"{node}_has_started").touch(mode=0o600, exist_ok=False)
-    except FileExistsError:
-        return True
-    return False
+    def _why_no_emulator(self, pid: int) -> str:
+        return BY_HAND if self.launcher is None else why_no_emulator(pid, self.launcher)
 
 
 def _is_serial_port(name: str) -> bool:

@@ -14,6 +14,7 @@ from typing import Self
 
 import psutil
 
+from paramove.bus import START_VARIABLE
 from paramove.documents import printable
 from paramove.supervision.environment import node_environment
 from paramove.supervision.launch_schema import NodeSettings
@@ -164,11 +165,13 @@ class SupervisedProcess:
 def node_process(
     name: str, settings: NodeSettings, run_folder: RunFolder, workspace: Workspace, guard: Guard
 ) -> SupervisedProcess:
-    """Starts a node's module with its configuration, at its priority."""
+    """Starts a node's module with its configuration, at its priority; its environment has the number of this start."""
+    run_folder.starts[name] += 1
+    start = {START_VARIABLE: str(run_folder.starts[name])}
     process = SupervisedProcess(
         [sys.executable, "-m", settings.module, "--config", str(run_folder.config(name))],
         folder=workspace.root,
-        environment=node_environment(os.environ, workspace),
+        environment=node_environment(os.environ, workspace) | start,
         guard=guard,
         log=run_folder.log(name),
     )

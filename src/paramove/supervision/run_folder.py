@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import os
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +21,14 @@ class RunFolder:
     Attributes:
         path: The folder.
         begun_ns: When the run began, by the monotonic clock.
+        starts: How often each node was started, by its name; in the memory of who starts them.
     """
 
     def __init__(self, path: Path) -> None:
         self.path, self.begun_ns = path, time.monotonic_ns()
         self.nodes = path / "nodes"
         self.logs = path / "logs"
+        self.starts = Counter[str]()
 
     @classmethod
     def create(cls, runs: Path, now: datetime.datetime) -> RunFolder:

@@ -1,7 +1,6 @@
 """A servo arm as a launch file names it: with which zeros it is driven, and what is refused."""
 
 import contextlib
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -22,6 +21,7 @@ from paramove.robots.this_launch import ThisLaunch
 from sim.emulated_arm import emulated_servos
 from tests.robots.dynamixel.person import Person
 from tests.robots.dynamixel.small_arm import calibration
+from tests.robots.one_process import HERE
 
 FOLDER = Path("robot_description")
 KOCH, OPEN = (RobotDescription.load(FOLDER / name) for name in ("koch_v1_1", "open_manipulator_x"))
@@ -37,8 +37,6 @@ def one_of(place: int) -> JointCalibration:
 
 
 LIMITS = {"timeouts": TIMEOUTS, "nominal": True}
-HERE = ThisLaunch(os.getpid())
-"""The launch that emulates the servos, in the tests of emulated ones."""
 
 
 def setup(port: Path, **parameters) -> ServoArmSetup:
