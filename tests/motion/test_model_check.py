@@ -48,6 +48,28 @@ def test_what_contradicts_the_model_is_rejected(tmp_path: Path, old: str, new: s
         check(changed(tmp_path, old, new))
 
 
+@pytest.mark.parametrize(
+    ("file", "old", "new", "named"),
+    [
+        ("robot.yaml", "yaw_axis: [0.012,", "yaw_axis: [0.014,", r"joint1: chain\.links\.yaw_axis .*0\.012"),
+        ("robot.yaml", "0.0, 0.0765]", "0.0, 0.0965]", r"joint2: chain\.links\.shoulder .*0\.0765"),
+        ("robot.yaml", "upper_arm: [0.024,", "upper_arm: [0.034,", r"joint3: chain\.links\.upper_arm .*0\.024"),
+        ("robot.yaml", "forearm: [0.124,", "forearm: [0.134,", r"joint4: chain\.links\.forearm .*0\.124"),
+        ("robot.yaml", "hand: [0.126,", "hand: [0.106,", r"end_effector: chain\.links\.hand .*0\.126"),
+        ("open_manipulator_x.xml", 'name="joint3" axis="0 1 0"', 'name="joint3" axis="0 -1 0"', r"joint3 turns about"),
+    ],
+)
+def test_the_joint_from_which_on_lengths_disagree_is_named(
+    tmp_path: Path, file: str, old: str, new: str, named: str
+) -> None:
+    changed(tmp_path, "name: open_manipulator_x", "name: another")
+    text = (tmp_path / file).read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / file).write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(DescriptionError, match=named):
+        check(tmp_path)
+
+
 def test_a_millimetre_is_tolerated(tmp_path: Path) -> None:
     check(changed(tmp_path, "hand: [0.126,", "hand: [0.1265,"))
 

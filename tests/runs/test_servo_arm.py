@@ -30,9 +30,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def record(folder: Path, gripper: tuple[float, ...], cube_x: float) -> None:
+def record(folder: Path, gripper: tuple[float, ...], cube_x: float, name: str = "red_cube") -> None:
     state = TruthState(gripper=gripper)
-    state.objects.add(name="red_cube", x=cube_x, y=0.1, z=0.02)
+    if name:
+        state.objects.add(name=name, x=cube_x, y=0.1, z=0.02)
     with RecordingWriter(next_part(folder / "truth.mcap"), "test") as recording:
         number = len(list(folder.glob("truth*")))
         recording.write(topics.TRUTH_STATE.name, state, number, number, number)
@@ -47,6 +48,19 @@ def test_a_run_is_judged_by_its_truth_even_if_the_judge_was_started_again(folder
     assert summary["gaps"] == [{"recording": "truth", "begin_s": pytest.approx(1e-9), "end_s": pytest.approx(2e-9)}]
     assert (folder / "tasks.png").is_file()
     assert "2 of 2 tasks done" in (folder / "report.html").read_text()
+
+
+@pytest.mark.parametrize("name", ["cube", "none", "$x_{", "[/red]", "_hidden", "0.5", "<b>"])
+def test_an_object_may_have_any_name(folder: Path, name: str) -> None:
+    record(folder, (0.2, 0.0, 0.104), 0.2, name)
+    assert servo_arm.main([str(folder), "--no-video"]) == 0
+    assert (folder / "tasks.png").is_file()
+
+
+def test_a_scene_without_an_object_is_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    record(folder, (0.2, 0.0, 0.104), 0.2, "")
+    assert servo_arm.main([str(folder), "--no-video"]) == 66
+    assert "free joint" in "".join(capsys.readouterr())
 
 
 def test_a_gap_counts_from_the_begin_of_the_run(folder: Path) -> None:

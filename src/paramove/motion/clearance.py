@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from paramove.documents import Floats, Ints
 from paramove.motion.gripper_arm import GripperArm
+from paramove.motion.lowest_point import LowestPoint
 from paramove.motion.model_check import check_model, qpos_addresses
 from paramove.motion.plans import MAX_STANDING, check_number
 from paramove.robots import RobotDescription, WorkingSurface
@@ -77,6 +78,7 @@ class ClearanceChecker:
         self._moving = [geom for geom in collides if int(model.geom_bodyid[geom]) in chain]
         self._hand = [geom for geom in self._moving if int(model.geom_bodyid[geom]) in hand]
         self._fixed = [geom for geom in collides if geom not in self._moving]
+        self._lowest = LowestPoint(model, self._moving)
 
     @property
     def grasp_height(self) -> float:
@@ -108,7 +110,7 @@ class ClearanceChecker:
         heights = np.empty(len(angles))
         for number, row in enumerate(angles):
             self._place(row)
-            heights[number] = self._lowest() - self._base[2] - self.surface.z
+            heights[number] = self._lowest.height(self._data) - self._base[2] - self.surface.z
         return heights
 
     def touching(self, angles: Floats) -> tuple[str, str] | None:
@@ -145,6 +147,7 @@ class ClearanceChecker:
         over = other == self._surface
         beyond = np.maximum(np.abs(away[over]) - self._model.geom_size[self._surface], 0.0)
         apart[over] = np.linalg.norm(beyond, axis=1)
+        apart[radius[other] == 0.0] = -FAR_M  # a plane, which has no end
         return [(int(a), int(b)) for a, b in pairs[apart - radius[one] < distance]]
 
     def _stand(self, standing: ArrayLike) -> list[int]:
@@ -169,18 +172,6 @@ class ClearanceChecker:
         if holding:
             data.mocap_pos[self._mocap(self._held)] = data.site_xpos[self._tip] - [0.0, 0.0, GRASPED_ABOVE_MIDDLE]
             mujoco.mj_kinematics(model, data)
-
-    def _lowest(self) -> float:
-        """Height of the lowest point of boxes and cylinders, of other shapes that of a ball around them; world, m."""
-        geoms, model = self._moving, self._model
-        upright = self._data.geom_xmat[geoms].reshape(-1, 3, 3)[:, 2]  # how far each own axis points up
-        size, kind = model.geom_size[geoms], model.geom_type[geoms]
-        box = (np.abs(upright) * size).sum(axis=1)
-        below = np.where(kind == mujoco.mjtGeom.mjGEOM_BOX, box, model.geom_rbound[geoms])
-        across = np.sqrt(np.maximum(0.0, 1.0 - upright[:, 2] ** 2))
-        cylinder = size[:, 1] * np.abs(upright[:, 2]) + size[:, 0] * across
-        below = np.where(kind == mujoco.mjtGeom.mjGEOM_CYLINDER, cylinder, below)
-        return float((self._data.geom_xpos[geoms, 2] - below).min())
 
     def _mocap(self, geom: int) -> int:
         return int(self._model.body_mocapid[self._model.geom_bodyid[geom]])

@@ -14,6 +14,9 @@ from paramove.robots import DescriptionError, RobotDescription
 TOLERANCE_M = 0.001
 RANGE_TOLERANCE = np.deg2rad(1.0)
 N_POSES = 20
+PARALLEL = 0.999
+"""Smallest cosine between the axis of a joint and where it should point."""
+_FORWARD, _LEFT, _UP = np.eye(3)
 
 
 def check_model(robot: RobotDescription) -> None:
@@ -58,8 +61,50 @@ def _check_arm(robot: RobotDescription, arm: GripperArm, model: mujoco.MjModel) 
             raise DescriptionError(
                 f"by the lengths in robot.yaml the end effector is at {_whole(1000 * described)} mm from "
                 f"{arm.base_site} with the joints at {_whole(np.rad2deg(angles[:-1]))} deg, in {robot.model_path.name} "
-                f"{arm.tip_site} is at {_whole(1000 * in_model)} mm: make them agree"
+                f"{arm.tip_site} is at {_whole(1000 * in_model)} mm: {_misfit(robot, model)}"
             )
+
+
+def _misfit(robot: RobotDescription, model: mujoco.MjModel) -> str:
+    """Which joint or length disagrees first from the base on, and the value that would fit."""
+    if robot.chain is None:
+        return "make its lengths and the model agree"
+    chain = robot.chain
+    lengths = chain.kinematics
+    data = mujoco.MjData(model)
+    data.qpos[qpos_addresses(model, robot.joint_names)] = robot.base_pose
+    data.qpos[qpos_addresses(model, chain.joints)] = 0.0
+    mujoco.mj_kinematics(model, data)
+    base = data.site(chain.sites.base)
+    axes_of_base = base.xmat.reshape(3, 3).T
+    axes = axes_of_base @ np.array([data.joint(name).xaxis for name in chain.joints]).T
+    for name, axis, expected in zip(chain.joints, axes.T, (_UP, *3 * (_LEFT,), _FORWARD), strict=False):
+        if axis @ expected < PARALLEL:
+            return (
+                f"in the zero pose {name} turns about {_short(axis)} in the model, about {_short(expected)} expected: "
+                "x is forward, y left, z up, and pitch is positive downward"
+            )
+    points = [data.joint(name).xanchor for name in chain.joints[:4]]
+    yaw, *pitches, tip = (
+        axes_of_base @ (np.array([*points, data.site(chain.sites.end_effector).xpos]) - base.xpos).T
+    ).T
+    stretches = np.diff(pitches, axis=0)
+    in_model = {
+        "yaw_axis": yaw[:2],
+        "shoulder": np.array([pitches[0][0] - yaw[0], tip[1] - yaw[1] - lengths.hand[1], pitches[0][2]]),
+        "upper_arm": stretches[0][[0, 2]],
+        "forearm": stretches[1][[0, 2]],
+        "hand": np.array([tip[0] - pitches[2][0], lengths.hand[1], tip[2] - pitches[2][2]]),
+    }
+    ends = dict(zip(in_model, (*chain.joints[:4], chain.sites.end_effector), strict=True))
+    for length, found in in_model.items():
+        described = np.array(getattr(lengths, length))
+        if np.linalg.norm(found - described) > TOLERANCE_M / len(in_model):
+            return (
+                f"the first difference is at {ends[length]}: chain.links.{length} is {described.tolist()} m, by the "
+                f"model it is {found.round(5).tolist()} m with all joints of the chain at 0"
+            )
+    return f"the joints from {chain.joints[1]} on agree only at 0: is a joint's axis or zero another one?"
 
 
 def qpos_addresses(model: mujoco.MjModel, joints: Iterable[str]) -> list[int]:
@@ -78,6 +123,10 @@ def _check_ranges(robot: RobotDescription, indices: Ints, model: mujoco.MjModel)
                 f"joint {robot.joint_names[index]}: robot.yaml allows {found[0]} to {found[1]} deg, "
                 f"{robot.model_path.name} has {allowed[0]} to {allowed[1]} deg"
             )
+
+
+def _short(direction: Floats) -> str:
+    return f"({', '.join(f'{value:.2g}' for value in direction.round(3) + 0.0)})"
 
 
 def _whole(values: Floats) -> str:

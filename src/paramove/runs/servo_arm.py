@@ -54,7 +54,10 @@ class TaskResult:
 
 
 def results_of(tasks: Sequence[dict[str, Any]], states: Sequence[TruthState]) -> list[TaskResult]:
-    """The result of each task. Of an object that several tasks move, the last one counts."""
+    """The result of each task. Of an object that several tasks move, the last one counts.
+
+    Raises RunFolderError if an object is to be placed and there is none.
+    """
     gripper = np.array([state.gripper for state in states])
     begin, end = (_places(states[at]) for at in (0, -1))
     results: dict[Any, TaskResult] = {}
@@ -65,6 +68,8 @@ def results_of(tasks: Sequence[dict[str, Any]], states: Sequence[TruthState]) ->
             results[number] = _result("reach", target, nearest, "")
         else:
             target = np.array(task["place"])
+            if not begin:
+                raise RunFolderError("the scene has no body with a free joint: there was nothing to pick")
             thing = min(begin, key=lambda name: float(np.linalg.norm(begin[name] - task["pick"])))
             begin[thing] = target
             results[thing] = _result("place", target, end[thing], thing)
@@ -88,7 +93,7 @@ def _evaluate(options: argparse.Namespace, console: Console) -> tuple[bool, list
     for one in results:
         what = f"{one.thing or 'hand'} to {_metres(one.wanted)}"
         mark = "" if one.good else "  <- too far"
-        console.print(f"  {one.task:6} {what:40} {1e3 * one.error:5.1f} mm away{mark}")
+        console.print(f"  {one.task:6} {what:40} {1e3 * one.error:5.1f} mm away{mark}", markup=False)
     from paramove.runs.servo_arm_film import write_film
 
     picture = _draw(folder / "tasks.png", results, states)
@@ -167,9 +172,9 @@ def _draw(path: Path, results: Sequence[TaskResult], states: Sequence[TruthState
     paths = {name: np.array([_places(state)[name] for state in states]) for name in _places(states[0])}
     for ax, (across, up), title in zip(axes, ((1, 0), (0, 2)), ("from above", "from the side"), strict=True):
         ax.plot(gripper[:, across], gripper[:, up], color="0.6", linewidth=1, label="hand")
-        for name, route in paths.items():
-            colour = name.split("_")[0]
-            ax.plot(route[:, across], route[:, up], linewidth=2, color=colour, label=name.replace("_", " "))
+        for number, (name, route) in enumerate(paths.items()):
+            colour = _colour(name, number)
+            ax.plot(route[:, across], route[:, up], linewidth=2, color=colour, label=_legend(name))
             ax.plot(
                 route[-1, across], route[-1, up], "s", color=colour, markersize=5
             )  # an object that did not move has no path
@@ -185,6 +190,18 @@ def _draw(path: Path, results: Sequence[TaskResult], states: Sequence[TruthState
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
     figure.savefig(path, dpi=110)
     return path
+
+
+def _colour(name: str, number: int) -> str:
+    """The colour that an object's name begins with, such as red_cube; else one of matplotlib's own."""
+    from matplotlib.colors import CSS4_COLORS
+
+    first = name.split("_")[0]
+    return first if first in CSS4_COLORS else f"C{number % 10}"
+
+
+def _legend(name: str) -> str:
+    return name.replace("_", " ").replace("$", r"\$")  # matplotlib would read formulas between dollars
 
 
 if __name__ == "__main__":
