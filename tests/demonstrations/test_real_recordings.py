@@ -25,8 +25,12 @@ POINTING = {
 
 @pytest.fixture(scope="module")
 def pointing(tmp_path_factory):
+    """The set, with the movements in which the tracker repeated a position for long, instead of losing the point."""
     folder = tmp_path_factory.mktemp("pointing") / "set"
-    found = import_file(DATA / "pointing27" / "data.npz", ImportOptions(points=POINTING))
+    found = import_file(DATA / "pointing27" / "data.npz", ImportOptions(points=POINTING), max_gap=0.1)
+    assert 5 < len(found.rejected) < 25
+    assert any("rightShoulder repeats its position exactly" in remark for remark in found.remarks)
+    found = import_file(DATA / "pointing27" / "data.npz", ImportOptions(points=POINTING, repeats_are_lost=False))
     write_set(folder, found.takes, found.parameter_names)
     return DemonstrationSet.load(folder)
 

@@ -17,7 +17,7 @@ from paramove.cli.movement_options import (
     words,
 )
 from paramove.cli.output import ended, one_line
-from paramove.documents import exit_codes
+from paramove.documents import exit_codes, printable
 
 if TYPE_CHECKING:
     from paramove.demonstrations import Label
@@ -46,6 +46,9 @@ def import_files(
     mapping: MappingOption = None,
     zeros_are_places: Annotated[
         bool, typer.Option("--zeros-are-places", help="a point at exactly (0, 0, 0) was not lost")
+    ] = False,
+    repeats_are_places: Annotated[
+        bool, typer.Option("--repeats-are-places", help="a point that repeats its position exactly was not lost")
     ] = False,
     action: LabelActionOption = None,
     theta: ThetaOption = "",
@@ -79,9 +82,11 @@ def import_files(
     if find is not None and label is None:
         raise typer.BadParameter("--find needs an --action", param_hint="--find")
     with one_line():
-        options = import_options(mapping, unit, axes, rate, point, zeros_are_places)
+        options = replace(
+            import_options(mapping, unit, axes, rate, point, zeros_are_places, repeats_are_places), subject=subject
+        )
         results = [import_file(file, options, label, max_gap, name, find) for file in files]
-        _tell(results, skip_refused)
+        _reject(results, skip_refused)
         names = given if given is not None else results[0].parameter_names or _names_of(values)
         _write(to, results, names, max_gap, repetition, add)
 
@@ -98,7 +103,8 @@ def import_options(
     axes: str | None,
     rate: float | None,
     point: list[str] | None,
-    zeros_are_places: bool,
+    zeros_are_places: bool = False,
+    repeats_are_places: bool = False,
 ) -> ImportOptions:
     """The mapping file's options, overlaid with those of the command line."""
     from paramove.demonstrations.importing import ImportOptions, axes_matrix, read_mapping_file
@@ -119,20 +125,25 @@ def import_options(
         rate_hz=rate or options.rate_hz,
         points=points or None,
         zeros_are_lost=options.zeros_are_lost and not zeros_are_places,
+        repeats_are_lost=options.repeats_are_lost and not repeats_are_places,
     )
 
 
-def _tell(results: list[Imported], skip_refused: bool) -> None:
-    """Prints remarks; ends the command if a movement was rejected, unless the rest is to be imported."""
-    for result in results:
-        for remark in result.remarks:
-            typer.echo(remark)
+def _reject(results: list[Imported], skip_refused: bool) -> None:
+    """Ends the command, with all remarks, if a movement was rejected, unless the rest is to be imported."""
     rejected = [line for result in results for line in result.rejected]
     if rejected and not skip_refused:
+        _print_remarks(results, err=True)
         hint = "nothing was imported; --skip-refused imports the rest, --max-gap fills longer losses"
         raise ended("\n".join([*rejected, hint]), exit_codes.CONFIGURATION)
     for line in rejected:
         typer.echo(f"left out: {line}", err=True)
+
+
+def _print_remarks(results: list[Imported], *, err: bool = False) -> None:
+    for result in results:
+        for remark in result.remarks:
+            typer.echo(printable(remark), err=err)
 
 
 def _write(
@@ -151,6 +162,7 @@ def _write(
             labels = take.labels if result.parameter_names else _counted(take.labels, there)
             takes.append(replace(take, labels=labels))
     write_set(to, takes, names, max_gap=max_gap, add=add)
+    _print_remarks(results)
     count = sum(len(take.labels) for take in takes)
     recordings = len({take.recording for take in takes})
     typer.echo(f"{to}: {count} movements in {recordings} recording{'' if recordings == 1 else 's'}")

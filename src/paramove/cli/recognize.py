@@ -63,7 +63,7 @@ def recognize(
         raise typer.BadParameter(f"expected m, cm or mm, found {unit!r}", param_hint="--unit")
     with one_line():
         examiner = Examiner(classifier_of(model))
-        options = demos_import.import_options(mapping, unit, axes, rate, point, False)
+        options = demos_import.import_options(mapping, unit, axes, rate, point)
         movements = movements_of(source, options, find)
         console = Console(stderr=True, highlight=False, emoji=False)
         many = len(movements) > 20

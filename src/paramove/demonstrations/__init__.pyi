@@ -20,6 +20,13 @@ from .body_frame import in_body_frame as in_body_frame
 from .body_frame import mirrored as mirrored
 from .demonstration_set import DemonstrationSet as DemonstrationSet
 from .demonstration_set import Sequences as Sequences
+from .frame_times import MAX_RATE_HZ as MAX_RATE_HZ
+from .frame_times import MIN_RATE_HZ as MIN_RATE_HZ
+from .frame_times import bursts as bursts
+from .frame_times import is_plausible as is_plausible
+from .frame_times import longer_step as longer_step
+from .frame_times import missing_frames as missing_frames
+from .frame_times import period_of as period_of
 from .gaps import fill_gaps as fill_gaps
 from .gaps import gaps_in_words as gaps_in_words
 from .gaps import gaps_within as gaps_within
@@ -37,7 +44,9 @@ from .movement import DemonstrationError as DemonstrationError
 from .movement import Movement as Movement
 from .movement import Side as Side
 from .movement import at_times as at_times
+from .movement import frame_ranges as frame_ranges
 from .movement import position_in_theta as position_in_theta
+from .movement import runs as runs
 from .movement_ends import FRAMES as FRAMES
 from .movement_ends import last_parts as last_parts
 from .plots import embedded as embedded

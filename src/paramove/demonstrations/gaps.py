@@ -8,11 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.demonstrations.frame_times import is_uneven
 from paramove.demonstrations.movement import at_times, runs
 from paramove.documents import Floats
 
 NEIGHBOURS = 5
 """Number of frames on each side of a gap that its spline goes through."""
+LONGEST_CUBIC_S = 0.1
+"""In longer gaps a cubic spline may overshoot far beyond the frames around."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,9 @@ def fill_gaps(
 ) -> tuple[Floats, list[PointGap], list[PointGap]]:
     """Fills gaps of at most `max_gap` seconds by a cubic spline through the frames around them.
 
+    Where the times of these frames are uneven, or the gap is longer than 0.1 s, the spline stays between its
+    neighbours (PCHIP).
+
     Args:
         time: Shape (T,), s, increasing.
         positions: Shape (T, P, 3); not finite where a point was lost.
@@ -71,15 +77,17 @@ def fill_gaps(
                 continue
             split = int(np.searchsorted(valid_frames, first))
             around = valid_frames[max(0, split - NEIGHBOURS) : split + NEIGHBOURS]
-            result[first:end, point] = _between(time, positions[:, point], around, time[first:end])
+            even = duration <= LONGEST_CUBIC_S * (1.0 + 1e-9) and not is_uneven(time[around[0] : around[-1] + 1])
+            result[first:end, point] = _between(time, positions[:, point], around, time[first:end], even=even)
             filled.append(gap)
     return result, filled, left
 
 
-def _between(time: Floats, path: Floats, around: NDArray[np.intp], new_time: Floats) -> Floats:
+def _between(time: Floats, path: Floats, around: NDArray[np.intp], new_time: Floats, *, even: bool) -> Floats:
     if len(around) < 4:
         return at_times(new_time, time[around], path[around])
-    from scipy.interpolate import CubicSpline  # a third of a second, which only a gap should cost
+    from scipy.interpolate import CubicSpline, PchipInterpolator  # a third of a second, which only a gap should cost
 
-    result: Floats = CubicSpline(time[around], path[around])(new_time)
+    spline = CubicSpline if even else PchipInterpolator
+    result: Floats = spline(time[around], path[around])(new_time)
     return result

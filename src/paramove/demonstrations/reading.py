@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.demonstrations.frame_times import longest_hole
 from paramove.demonstrations.gaps import PointGap, fill_gaps, gaps_in_words, gaps_within
 from paramove.demonstrations.labels import Labels, LabelsError, Segment
 from paramove.demonstrations.movement import DemonstrationError, Movement
@@ -53,6 +54,14 @@ class _Reader:
             self.findings.append(self._labels.error(index, fault))
             return None
         chosen = _frames(segment, poses)
+        hole_s = longest_hole(poses.time[chosen])
+        if hole_s > self._labels.file.max_gap * (1.0 + 1e-9):
+            message = (
+                f"{segment}: no pose at all for {hole_s:.3g} s, longer than max_gap ({self._labels.file.max_gap:g} s). "
+                "Shorten the segment, or raise max_gap"
+            )
+            self.findings.append(self._labels.error(index, message))
+            return None
         inside = gaps_within(left, chosen[0], chosen[-1] + 1)
         if inside:
             message = (

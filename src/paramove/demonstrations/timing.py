@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from paramove.demonstrations.frame_times import check_stretch, is_uneven, period_of
 from paramove.demonstrations.movement import DemonstrationError, Movement, at_times
 from paramove.documents import Floats
 
@@ -19,8 +20,11 @@ SPEED_WINDOW = 0.2
 def resampled(movement: Movement, rate_hz: float) -> Movement:
     """The movement at `rate_hz` frames a second, by cubic splines; it may end up to one new frame earlier.
 
-    A movement that has these frame times already is returned as it is. Raises ValueError for a rate that is not
-    positive, DemonstrationError if fewer than 2 frames would be left.
+    A movement that has these frame times already is returned as it is. Where the times are uneven, the splines are
+    monotone between neighbours (PCHIP; Fritsch and Carlson 1980), so that a wrong time cannot make them overshoot.
+
+    Raises ValueError for a rate that is not positive, DemonstrationError if fewer than 2 frames would be left, or far
+    more than there are.
     """
     if not rate_hz > 0.0 or not np.isfinite(rate_hz):
         raise ValueError(f"a positive, finite frame rate expected, found {rate_hz}")
@@ -30,12 +34,15 @@ def resampled(movement: Movement, rate_hz: float) -> Movement:
             f"{movement.source}: {movement.duration:g} s are less than two frames at {rate_hz:g} Hz; "
             "choose a higher rate or a longer segment"
         )
+    check_stretch(len(movement.time), count, movement.source)
     time: Floats = np.arange(count) / rate_hz
     if count == len(movement.time) and np.allclose(time, movement.time, rtol=0.0, atol=1e-8):
         return movement
-    from scipy.interpolate import make_interp_spline  # a third of a second, which only a new rate should cost
+    from scipy.interpolate import PchipInterpolator, make_interp_spline  # a third of a second, for a new rate only
 
     inside = np.minimum(time, movement.time[-1])
+    if is_uneven(movement.time):
+        return replace(movement, time=time, positions=PchipInterpolator(movement.time, movement.positions)(inside))
     degree = min(3, len(movement.time) - 1)
     spline = make_interp_spline(movement.time, movement.positions, k=degree)
     return replace(movement, time=time, positions=spline(inside))
@@ -46,8 +53,9 @@ def speeds(movement: Movement, point: str = FINGERTIP) -> Floats:
     from scipy.signal import savgol_filter  # half a second, which only those who ask for speeds should wait
 
     path = movement.point(point)
-    period = float(np.median(np.diff(movement.time)))
+    period = period_of(movement.time)
     count = int(np.floor(movement.duration / period + 1e-6)) + 1
+    check_stretch(len(movement.time), count, movement.source)
     even = np.arange(count, dtype=np.float64) * period  # the filter needs equal steps, recordings may have others
     spaced = at_times(even, movement.time, path)
     window = min(2 * round(0.5 * SPEED_WINDOW / period) + 1, count - 1 + count % 2)

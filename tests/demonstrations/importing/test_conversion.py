@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from paramove.demonstrations.importing import ImportOptions, read_mapping_file
-from paramove.demonstrations.importing.conversion import RawTake, axes_matrix, converted
+from paramove.demonstrations.importing.checking import RawTake
+from paramove.demonstrations.importing.conversion import axes_matrix, converted
 from paramove.demonstrations.movement import DemonstrationError
 from paramove.demonstrations.writing import Label
 
@@ -47,13 +48,13 @@ def test_what_is_no_axes(axes):
 
 @pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("cm", 0.01), ("mm", 0.001)])
 def test_units(unit, factor):
-    take = converted(raw(unit=unit), ImportOptions(), FILE)
+    take, _ = converted(raw(unit=unit), ImportOptions(), FILE)
     assert_allclose(take.positions, factor * raw().positions, rtol=1e-15, atol=0.0)
     assert take.recording == "a_take.mcap"
 
 
 def test_what_the_user_says_comes_before_what_the_file_says():
-    take = converted(raw(unit="mm", axes="z_up"), ImportOptions(unit="m", axes="y_up", rate_hz=10.0), FILE)
+    take, _ = converted(raw(unit="mm", axes="z_up"), ImportOptions(unit="m", axes="y_up", rate_hz=10.0), FILE)
     assert_allclose(take.positions[0, 0], [3.0, 1.0, 2.0], rtol=0.0, atol=0.0)
     assert_allclose(take.time, [0.0, 0.1, 0.2], rtol=0.0, atol=1e-15)
 
@@ -61,9 +62,9 @@ def test_what_the_user_says_comes_before_what_the_file_says():
 def test_targets_are_converted_with_the_points():
     label = Label(0, 3, "reach", (100.0, 200.0, 300.0), "P1")
     names = ("target_x", "target_y", "target_z")
-    take = converted(raw(unit="mm", axes="y_up", labels=(label,), parameter_names=names), ImportOptions(), FILE)
+    take, _ = converted(raw(unit="mm", axes="y_up", labels=(label,), parameter_names=names), ImportOptions(), FILE)
     assert take.labels[0].theta == pytest.approx((0.3, 0.1, 0.2))
-    other = converted(raw(unit="mm", labels=(label,), parameter_names=("u", "v", "w")), ImportOptions(), FILE)
+    other, _ = converted(raw(unit="mm", labels=(label,), parameter_names=("u", "v", "w")), ImportOptions(), FILE)
     assert other.labels[0].theta == (100.0, 200.0, 300.0)
 
 
@@ -73,7 +74,7 @@ def test_targets_are_converted_with_the_points():
         ({}, {}, "take.csv does not define its unit; give --unit m, cm, mm"),
         ({"unit": "inch"}, {}, "the unit is 'inch'; give --unit"),
         ({"unit": "m", "time": None}, {}, "has neither times nor a frame rate; give --rate"),
-        ({"unit": "m", "time": np.array([0.0, 2.0, 1.0])}, {}, "the time of frame 2 is 1 s, not after 2 s"),
+        ({"unit": "m", "time": np.array([0.0, 2.0, 1.0])}, {}, "the time of frame 2 is 1, not after 2"),
         ({"unit": "m"}, {"points": {"index": ("C",)}}, "has no point 'C' for index"),
     ],
 )
@@ -84,7 +85,7 @@ def test_what_is_missing_is_told_with_its_option(changes, options, detail):
 
 def test_points_are_chosen_renamed_and_averaged():
     points = {"wrist": ("A", "B"), "index": ("S:B",)}
-    take = converted(raw(unit="m"), ImportOptions(points=points), FILE)
+    take, _ = converted(raw(unit="m"), ImportOptions(points=points), FILE)
     assert take.point_names == ("wrist", "index")
     assert_allclose(take.positions[:, 0], raw().positions.mean(axis=1), rtol=1e-15, atol=0.0)
     assert_allclose(take.positions[:, 1], raw().positions[:, 1], rtol=0.0, atol=0.0)
@@ -94,10 +95,10 @@ def test_zeros_are_lost_unless_they_are_places():
     positions = raw().positions.copy()
     positions[1, 0] = 0.0
     positions[2, 1, 0] = 0.0
-    lost = converted(raw(unit="m", positions=positions), ImportOptions(), FILE)
+    lost, _ = converted(raw(unit="m", positions=positions), ImportOptions(), FILE)
     assert np.isnan(lost.positions[1, 0]).all()
     assert np.isfinite(lost.positions).sum() == 15
-    places = converted(raw(unit="m", positions=positions), ImportOptions(zeros_are_lost=False), FILE)
+    places, _ = converted(raw(unit="m", positions=positions), ImportOptions(zeros_are_lost=False), FILE)
     assert np.isfinite(places.positions).all()
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paramove.demonstrations import DemonstrationError
-from paramove.demonstrations.importing.conversion import RawTake
+from paramove.demonstrations.importing.checking import RawTake, check_length
 from paramove.documents import Floats, read_text
 
 MAX_LEVELS = 200
@@ -64,7 +64,7 @@ def read_bvh(path: Path) -> list[RawTake]:
     names = tuple(joint.name for joint in motion.joints)
     positions = joint_positions(motion.joints, motion.values)
     time: Floats = np.arange(len(positions), dtype=np.float64) * motion.frame_time
-    return [RawTake(path.stem, time, positions, names, axes="y_up")]
+    return [RawTake(path.stem, time, positions, names, axes="y_up", time_unit_s=1.0)]
 
 
 def joint_positions(joints: tuple[Joint, ...], values: Floats) -> Floats:
@@ -122,6 +122,7 @@ class _Parser:
         self._expect("MOTION")
         self._expect("Frames:")
         frames = self._number("how many frames there are")
+        check_length(frames, self._source)
         self._expect("Frame")
         self._expect("Time:")
         frame_time = self._number("the time of a frame in seconds")

@@ -11,14 +11,14 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from paramove.demonstrations import DemonstrationError, Label, Take, position_in_theta, recording_name
+from paramove.demonstrations import DemonstrationError, Take, position_in_theta, recording_name
+from paramove.demonstrations.importing.checking import RawTake, checked, extent
 from paramove.documents import Floats, closest, nearest, read_document
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 FRAME = "laboratory"
-LONGEST_S = 1e7
-SHORTEST_S = 1e-9
-"""Between two frames: times are written in whole nanoseconds."""
+UNLABELLED = ("", "*")
+"""Names of C3D files for markers that nobody has named."""
 
 DIRECTIONS = {
     "forward": (1.0, 0.0, 0.0),
@@ -33,31 +33,6 @@ PRESETS = {"z_up": "forward,left,up", "y_up": "left,up,forward"}
 
 
 @dataclass(frozen=True)
-class RawTake:
-    """Frames that were captured one after the other, in the unit, axes and names of their file.
-
-    Attributes:
-        name: For the recording that it becomes a part of.
-        time: Shape (T,), s; None if the file has neither times nor a rate.
-        positions: Shape (T, P, 3), in the file's unit and axes; NaN where a point was lost.
-        point_names: Of the P points, as the file has them.
-        unit: "m", "cm", "mm"; None if the file does not define it.
-        axes: Directions of x, y, z as `axes_matrix` takes them; None if the file does not define it.
-        labels: The file's labels of movements; positions in theta are in the file's unit and axes.
-        parameter_names: Of theta.
-    """
-
-    name: str
-    time: Floats | None
-    positions: Floats
-    point_names: tuple[str, ...]
-    unit: str | None = None
-    axes: str | None = None
-    labels: tuple[Label, ...] = ()
-    parameter_names: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class ImportOptions:
     """Properties that a file does not define, or that replace the file's.
 
@@ -67,6 +42,8 @@ class ImportOptions:
         points: Name of a body point -> names in the file, of which the mean is taken; None: all, with their names.
         rate_hz: Frame rate; None: the file's.
         zeros_are_lost: Whether a point at exactly (0, 0, 0) was lost in that frame.
+        repeats_are_lost: Whether a point that repeats its position exactly, while others move, was lost.
+        subject: Whose points are taken if several persons have points of one name, as in `Ann:index` and `Ben:index`.
     """
 
     unit: str | None = None
@@ -74,6 +51,8 @@ class ImportOptions:
     points: Mapping[str, tuple[str, ...]] | None = None
     rate_hz: float | None = None
     zeros_are_lost: bool = True
+    repeats_are_lost: bool = True
+    subject: str = ""
 
 
 def axes_matrix(axes: str) -> Floats:
@@ -98,23 +77,43 @@ def axes_matrix(axes: str) -> Floats:
     return matrix
 
 
-def converted(raw: RawTake, options: ImportOptions, file: Path) -> Take:
-    """A take in metres, x forward, y left, z up, with the requested points.
+def converted(raw: RawTake, options: ImportOptions, file: Path | str) -> tuple[Take, tuple[str, ...]]:
+    """A take in metres, x forward, y left, z up, with the requested points, checked; and remarks on what was assumed.
 
-    Raises DemonstrationError if the unit, the rate or a point is not known.
+    Raises DemonstrationError if the unit, the rate or a point is not known, or the take cannot be used (`checked`).
     """
     unit = options.unit or raw.unit
     if unit is None:
         raise DemonstrationError(f"{file} does not define its unit; give --unit {', '.join(METRES)}")
     if unit not in METRES:
         raise DemonstrationError(f"{file}: the unit is '{unit}'; give --unit {', '.join(METRES)} to define it")
+    take = checked(
+        raw,
+        file,
+        rate_hz=options.rate_hz,
+        zeros_are_lost=options.zeros_are_lost,
+        repeats_are_lost=options.repeats_are_lost,
+    )
     matrix = axes_matrix(options.axes or raw.axes or "z_up") * METRES[unit]
-    positions = raw.positions.copy()
-    if options.zeros_are_lost:
-        positions[(positions == 0.0).all(axis=-1)] = np.nan
-    positions, names = chosen_points(positions, raw.point_names, options.points, file)
-    labels = tuple(replace(label, theta=_theta(label.theta, raw.parameter_names, matrix)) for label in raw.labels)
-    return Take(recording_name(raw.name), _time(raw, options, file), positions @ matrix.T, names, FRAME, labels)
+    chosen, names = chosen_points(take, options.points, options.subject, file)
+    labels = tuple(replace(label, theta=_theta(label.theta, raw.parameter_names, matrix)) for label in take.labels)
+    positions = chosen @ matrix.T
+    remarks = take.remarks
+    if options.axes is None and not raw.axes_are_known:
+        remarks += (_assumed(raw.axes or "z_up", positions, file),)
+    time: Floats = np.asarray(take.time)
+    return Take(recording_name(raw.name), time, positions, names, FRAME, labels), remarks
+
+
+def _assumed(axes: str, positions: Floats, file: Path | str) -> str:
+    """What was assumed of the axes, with the extent that follows: a person sees which way is up."""
+    up = axes_matrix(axes)[2]
+    letter = "xyz"[int(np.argmax(np.abs(up)))]
+    sign = "-" if up.min() < -0.5 else ""
+    return (
+        f"{file}: the file does not define its axes; its {sign}{letter} is taken as up ({axes}; --axes changes it): "
+        f"{extent(positions)}, z up"
+    )
 
 
 def _theta(theta: tuple[float, ...], names: tuple[str, ...], matrix: Floats) -> tuple[float, ...]:
@@ -125,46 +124,70 @@ def _theta(theta: tuple[float, ...], names: tuple[str, ...], matrix: Floats) -> 
     return tuple(values.tolist())
 
 
-def _time(raw: RawTake, options: ImportOptions, file: Path) -> Floats:
-    if options.rate_hz is not None:
-        return np.arange(len(raw.positions)) / options.rate_hz
-    if raw.time is None:
-        raise DemonstrationError(f"{file} has neither times nor a frame rate; give --rate")
-    if len(raw.time) and not np.ptp(raw.time) < LONGEST_S:
-        raise DemonstrationError(
-            f"{file}: its times go from {raw.time[0]:g} to {raw.time[-1]:g} s; expected seconds, at most {LONGEST_S:g}"
-        )
-    bad = np.flatnonzero(~(np.diff(raw.time) > SHORTEST_S))
-    if bad.size:
-        frame = int(bad[0]) + 1
-        raise DemonstrationError(
-            f"{file}: the time of frame {frame} is {raw.time[frame]:g} s, not after {raw.time[frame - 1]:g} s; "
-            "correct it, or give --rate to count frames instead"
-        )
-    return raw.time
-
-
 def chosen_points(
-    positions: Floats, names: Sequence[str], requested: Mapping[str, tuple[str, ...]] | None, file: Path
+    take: RawTake, requested: Mapping[str, tuple[str, ...]] | None, subject: str, file: Path | str
 ) -> tuple[Floats, tuple[str, ...]]:
     """Body points out of a file's points: each the mean of one or several; lost where one of them is.
 
-    A file's name may be given without what stands before its last ':' (`Anna:RWRA`). Raises DemonstrationError with
-    the names there are.
+    A file's name may be given without what stands before its last ':' (`Anna:RWRA`); then all come from one person, the
+    subject if there are several. Raises DemonstrationError with the names there are, with all that are meant if several
+    are, and for points that cannot be used. Points that are not requested do not matter.
     """
     if requested is None:
-        return positions, tuple(names)
-    short = {name.rpartition(":")[2]: number for number, name in enumerate(names)}
-    full = {name: number for number, name in enumerate(names)}
-    columns = []
-    for point, sources in requested.items():
-        unknown = [source for source in sources if source not in full and source not in short]
-        if unknown:
-            hint = "".join(f"; did you mean '{one}'?" for one in closest(unknown[0], short))
-            raise DemonstrationError(f"{file} has no point '{unknown[0]}' for {point}{hint} It has {', '.join(names)}")
-        numbers = [full.get(source, short.get(source, 0)) for source in sources]
-        columns.append(positions[:, numbers].mean(axis=1) if len(numbers) > 1 else positions[:, numbers[0]])
+        named = [number for number, name in enumerate(take.point_names) if name not in UNLABELLED]
+        requested = {take.point_names[number]: (take.point_names[number],) for number in named}
+    numbers: dict[str, int] = {}
+    for point, names in requested.items():
+        for source in names:
+            numbers[source] = _number(source, point, take.point_names, subject, file)
+    found = {source: take.point_names[number] for source, number in numbers.items()}
+    _reject_mixed_persons([name for source, name in found.items() if name != source], file)
+    for number in numbers.values():
+        if take.point_names[number] in take.faults:
+            raise DemonstrationError(take.faults[take.point_names[number]])
+    columns = [
+        take.positions[:, [numbers[name] for name in names]].mean(axis=1)
+        if len(names) > 1
+        else take.positions[:, numbers[names[0]]]
+        for names in requested.values()
+    ]
+    if not columns:
+        raise DemonstrationError(f"{file} has no point with a name")
     return np.stack(columns, axis=1), tuple(requested)
+
+
+def _number(source: str, point: str, names: Sequence[str], subject: str, file: Path | str) -> int:
+    """Number of the one point of a file that is meant by a name for a body point."""
+    candidates = [number for number, name in enumerate(names) if name == source]
+    if not candidates:
+        candidates = [number for number, name in enumerate(names) if name.rpartition(":")[2] == source]
+        if subject and subject.casefold() in map(_person, names):
+            candidates = [number for number in candidates if _person(names[number]) == subject.casefold()]
+    if not candidates:
+        short = [name.rpartition(":")[2] for name in names]
+        hint = "".join(f"; did you mean '{one}'?" for one in closest(source, short))
+        raise DemonstrationError(f"{file} has no point '{source}' for {point}{hint} It has {', '.join(names)}")
+    if len(candidates) > 1:
+        there = ", ".join(f"{names[number]} (point {number + 1})" for number in candidates)
+        raise DemonstrationError(
+            f"{file}: '{source}' may be {there}; give the whole name with --point, or the person with --subject, or "
+            "different names to the points"
+        )
+    return candidates[0]
+
+
+def _person(name: str) -> str:
+    """What stands before the last ':' of a point's name."""
+    return name.rpartition(":")[0].casefold()
+
+
+def _reject_mixed_persons(names: Sequence[str], file: Path | str) -> None:
+    """Raises DemonstrationError if points whose short names were given belong to several persons."""
+    of_person = {_person(name): name for name in names}
+    if len(of_person) > 1:
+        raise DemonstrationError(
+            f"{file}: the requested points are of several persons: {', '.join(names)}; give whole names with --point"
+        )
 
 
 def _as_list(value: object) -> object:
@@ -180,6 +203,7 @@ class MappingFile(BaseModel):
     axes: str | None = None
     rate: Annotated[float, Field(gt=0.0)] | None = None
     zeros_are_lost: bool = True
+    repeats_are_lost: bool = True
     points: dict[str, Annotated[list[str], BeforeValidator(_as_list), Field(min_length=1)]] | None = None
 
 
@@ -196,4 +220,6 @@ def read_mapping_file(path: Path) -> ImportOptions:
     if mapping.axes is not None:
         axes_matrix(mapping.axes)
     points = None if mapping.points is None else {name: tuple(sources) for name, sources in mapping.points.items()}
-    return ImportOptions(mapping.unit, mapping.axes, points, mapping.rate, mapping.zeros_are_lost)
+    return ImportOptions(
+        mapping.unit, mapping.axes, points, mapping.rate, mapping.zeros_are_lost, mapping.repeats_are_lost
+    )

@@ -20,7 +20,8 @@ from paramove.demonstrations import (
 )
 from paramove.demonstrations.importing.bvh import read_bvh
 from paramove.demonstrations.importing.c3d import read_c3d
-from paramove.demonstrations.importing.conversion import ImportOptions, RawTake, converted
+from paramove.demonstrations.importing.checking import RawTake
+from paramove.demonstrations.importing.conversion import ImportOptions, converted
 from paramove.demonstrations.importing.csv_file import read_csv
 from paramove.demonstrations.importing.npz import read_npz
 
@@ -29,8 +30,9 @@ READERS: dict[str, Callable[[Path], list[RawTake]]] = {
     ".bvh": read_bvh,
     ".csv": read_csv,
     ".tsv": read_csv,
+    ".npz": read_npz,
 }
-SUFFIXES = (*READERS, ".npz")  # the reader of .npz also returns remarks
+SUFFIXES = tuple(READERS)
 
 
 @dataclass(frozen=True)
@@ -72,28 +74,27 @@ def import_file(
     """
     if not path.is_file():
         raise DemonstrationError(f"there is no file {path}", missing=True)
-    suffix = path.suffix.lower()
-    if suffix == ".npz":
-        raws, remarks = read_npz(path)
-    elif suffix in READERS:
-        raws, remarks = READERS[suffix](path), []
-    else:
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
         raise DemonstrationError(f"{path}: files of motion capture end in {', '.join(SUFFIXES)}")
+    raws = reader(path)
     takes, rejected = [], []
+    remarks: dict[str, None] = {}  # many takes of a file may have the same
     for raw in raws:
-        take = converted(raw, options, path)
+        source = f"{path}, {raw.part}" if raw.part else str(path)
+        take, about = converted(raw, options, source)
         if name is not None:
             take = replace(take, recording=recording_name(name + raw.name.removeprefix(path.stem)))
         if not take.labels and label is not None:
-            take = replace(take, labels=_labels(take, label, find, max_gap, path))
-        checked, new_remarks, new_rejected = _checked(take, path, max_gap)
-        takes.append(checked)
-        remarks += new_remarks
+            take = replace(take, labels=_labels(take, label, find, max_gap, source))
+        accepted, about_gaps, new_rejected = _without_long_gaps(take, source, max_gap)
+        takes.append(accepted)
+        remarks |= dict.fromkeys([*about, *about_gaps])
         rejected += new_rejected
     return Imported(tuple(takes), raws[0].parameter_names, tuple(remarks), tuple(rejected))
 
 
-def _labels(take: Take, label: Label, find: str | None, max_gap: float, path: Path) -> tuple[Label, ...]:
+def _labels(take: Take, label: Label, find: str | None, max_gap: float, path: str) -> tuple[Label, ...]:
     """The label for the whole take, or for each movement that is detected in it."""
     if find is None:
         return (replace(label, end=label.end or len(take.time)),)
@@ -106,7 +107,7 @@ def _labels(take: Take, label: Label, find: str | None, max_gap: float, path: Pa
     return tuple(replace(label, first=first, end=end) for first, end in movements)
 
 
-def _checked(take: Take, path: Path, max_gap: float) -> tuple[Take, list[str], list[str]]:
+def _without_long_gaps(take: Take, path: str, max_gap: float) -> tuple[Take, list[str], list[str]]:
     """The take with the labels of those movements in which no point is lost for too long; remarks; rejected ones."""
     _, filled, left = fill_gaps(take.time, take.positions, take.point_names, max_gap)
     labels, remarks, rejected = [], [], []

@@ -8,27 +8,28 @@ Many: `flat` (frames, 3 P), `flat_time`, `offsets` (movements + 1,), `points`, `
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from paramove.demonstrations import TARGET_NAMES, DemonstrationError, Label, Side
-from paramove.demonstrations.importing.conversion import RawTake
+from paramove.demonstrations.importing.checking import RawTake, check_length
 from paramove.documents import Floats, read_arrays
 
 SIDES: dict[str, Side] = {"L": "left", "R": "right", "left": "left", "right": "right"}
 Arrays = dict[str, Any]
 
 
-def read_npz(path: Path) -> tuple[list[RawTake], list[str]]:
-    """Takes, and remarks on movements that are left out: those marked as not ok, and those without a target.
+def read_npz(path: Path) -> list[RawTake]:
+    """Takes; the first has remarks on movements that are left out: those marked as not ok, and those without a target.
 
     Raises DemonstrationError for arrays that are missing or do not fit together.
     """
     arrays = read_arrays(path, raising=DemonstrationError)
     try:
-        return _many(path, arrays) if "flat" in arrays else ([_one(path, arrays)], [])
+        return _many(path, arrays) if "flat" in arrays else [_one(path, arrays)]
     except KeyError as error:
         there = ", ".join(sorted(arrays))
         raise DemonstrationError(f"{path}: the array {error} is missing; there are {there}") from error
@@ -45,24 +46,38 @@ def _one(path: Path, arrays: Arrays) -> RawTake:
         raise DemonstrationError(
             f"{path}: positions have shape {positions.shape}; {len(names)} points need (T, {len(names)}, 3)"
         )
+    check_length(len(positions), path)
     rate = next((float(arrays[key]) for key in ("rate_hz", "fps") if key in arrays), None)
     time = np.asarray(arrays["time"], dtype=np.float64) if "time" in arrays else None
+    unit_s = None
     if time is None and rate is not None:
         time = np.arange(len(positions)) / rate
+        unit_s = 1.0
     if time is not None and time.shape != (len(positions),):
         raise DemonstrationError(f"{path}: {len(positions)} frames have times of shape {time.shape}")
     unit, axes = (str(arrays[key]) if key in arrays else None for key in ("unit", "axes"))
-    return RawTake(path.stem, time, positions.reshape(len(positions), -1, 3), names, unit, axes)
+    return RawTake(
+        path.stem,
+        time,
+        positions.reshape(len(positions), -1, 3),
+        names,
+        unit,
+        axes,
+        axes_are_known=axes is not None,
+        time_unit_s=unit_s,
+    )
 
 
-def _many(path: Path, arrays: Arrays) -> tuple[list[RawTake], list[str]]:
+def _many(path: Path, arrays: Arrays) -> list[RawTake]:
     names = tuple(str(name) for name in arrays["points"])
     flat = np.asarray(arrays["flat"], dtype=np.float64).reshape(len(arrays["flat_time"]), len(names), 3)
     offsets = np.concatenate([[0], arrays["offsets"].astype(int), [len(flat)]])
     if (np.diff(offsets) < 0).any() or len(offsets) < len(arrays["action"]) + 3:
         raise DemonstrationError(f"{path}: expected offsets of each movement, increasing, up to {len(flat)} frames")
     offsets = offsets[1:-1]
-    without, takes, left_out = 0, [], []
+    without = 0
+    takes: list[RawTake] = []
+    left_out = []
     for number in range(len(arrays["action"])):
         if not arrays["ok"][number]:
             left_out.append(f"{number} ({arrays['reason'][number] or 'not ok'})")
@@ -76,7 +91,7 @@ def _many(path: Path, arrays: Arrays) -> tuple[list[RawTake], list[str]]:
         remarks.append(f"{path}: left out {without} movements that have no target")
     if not takes:
         raise DemonstrationError(f"{path} has no movement that is ok and has a target")
-    return takes, remarks
+    return [replace(takes[0], remarks=tuple(remarks)), *takes[1:]]
 
 
 def _take(path: Path, arrays: Arrays, number: int, positions: Floats, names: tuple[str, ...]) -> RawTake:
@@ -99,4 +114,15 @@ def _take(path: Path, arrays: Arrays, number: int, positions: Floats, names: tup
         SIDES[str(arrays["hand"][number])] if "hand" in arrays else "right",
     )
     unit, axes = str(arrays["unit"]), str(arrays["axes"])
-    return RawTake(f"{path.stem}_subject_{subject}", time, positions, names, unit, axes, (label,), TARGET_NAMES)
+    return RawTake(
+        f"{path.stem}_subject_{subject}",
+        time,
+        positions,
+        names,
+        unit,
+        axes,
+        axes_are_known=True,
+        labels=(label,),
+        parameter_names=TARGET_NAMES,
+        part=f"movement {number}",
+    )
