@@ -7,14 +7,16 @@ Publishes   camera/image       foxglove.CompressedImage   15 Hz   camera_optical
 from pydantic import Field
 
 from paramove.bus import Bus, NodeConfig, Received, main, topics
-from paramove.cameras import EndOfFrames, FrameChecks, FrameError, encode, open_source
+from paramove.cameras import EndOfFrames, FrameChecks, FrameError, encode, open_source, without_password
 
 SUBSCRIBES = (topics.CAMERA_IMAGE_RAW,)
 PUBLISHES = (topics.CAMERA_IMAGE,)
 
 
 class Config(NodeConfig):
-    source: str = "topic:camera/image_raw"  # or file:PATH, device:PATH, folder:PATH@RATE, recording:PATH#TOPIC
+    source: str = (
+        "topic:camera/image_raw"  # or file:PATH, device:PATH, device:URL, folder:PATH@RATE, recording:PATH#TOPIC
+    )
     width: int = Field(480, gt=0)
     height: int = Field(360, gt=0)
     jpeg_quality: int = Field(95, ge=1, le=100)
@@ -25,7 +27,8 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes or a video file ends. A bad frame is not published and makes the node degraded."""
     source = open_source(config.source, config.width, config.height, bus.run_folder)
     checks = FrameChecks(config.width, config.height, config.frozen_after)
-    bus.ready(f"frames from {config.source}")
+    name = without_password(config.source)
+    bus.ready(f"frames from {name}")
     fault = ""
     try:
         for event in bus.events(topics.CAMERA_IMAGE_RAW, tick=True) if source.from_topic else bus.events(tick=True):
@@ -45,7 +48,7 @@ def run(bus: Bus, config: Config) -> None:
                 continue
             if fault:
                 fault = ""
-                bus.ready(f"frames from {config.source} again")
+                bus.ready(f"frames from {name} again")
     finally:
         source.close()
 

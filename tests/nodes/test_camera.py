@@ -83,10 +83,8 @@ def test_a_frozen_picture_is_said_no_more() -> None:
     [
         ("file:/nowhere/clip.avi", "no video file .*/nowhere/clip.avi"),
         ("device:/dev/no-such-camera", "no camera /dev/no-such-camera; found"),
-        (
-            "socket:1",
-            "topic:camera/image_raw, file:PATH, device:PATH, folder:PATH@RATE or recording:PATH#TOPIC expected",
-        ),
+        ("socket:1", "topic:camera/image_raw, file:PATH, device:PATH, device:URL, folder:PATH@RATE"),
+        ("device:ftp://camera/video", "http://, https://, rtsp://"),
         ("topic:camera/image", "expected"),
     ],
 )

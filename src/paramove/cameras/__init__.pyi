@@ -29,7 +29,9 @@ from .charuco_sheet import marker_sheet as marker_sheet
 from .frame_sources import PICTURES as PICTURES
 from .frame_sources import DeviceFrames as DeviceFrames
 from .frame_sources import FileFrames as FileFrames
+from .frame_sources import is_network_camera as is_network_camera
 from .frame_sources import open_source as open_source
+from .frame_sources import without_password as without_password
 from .frames import EndOfFrames as EndOfFrames
 from .frames import Frame as Frame
 from .frames import FrameChecks as FrameChecks

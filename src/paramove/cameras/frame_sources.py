@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -22,7 +23,11 @@ from paramove.recording import Recorded, read
 
 _log = logging.getLogger(__name__)
 
-SOURCES = "topic:camera/image_raw, file:PATH, device:PATH, folder:PATH@RATE or recording:PATH#TOPIC"
+SOURCES = "topic:camera/image_raw, file:PATH, device:PATH, device:URL, folder:PATH@RATE or recording:PATH#TOPIC"
+URLS = ("http://", "https://", "rtsp://")
+"""Network cameras that OpenCV reads: MJPEG over HTTP, or RTSP."""
+OPEN_TIMEOUT_MS = 2000
+READ_TIMEOUT_MS = 1000
 TIMEOUT_NS = 1_000_000_000
 """A source without frames for longer has a fault."""
 PICTURES = (".jpg", ".jpeg", ".png", ".bmp")
@@ -215,14 +220,14 @@ class RecordingFrames(PlayedFrames):
 
 
 class DeviceFrames(FrameSource):
-    """Frames of a V4L2 device or a program's socket, read by a thread that stores only the latest: no frame is late.
+    """Frames of a V4L2 device, a network camera or a program's socket, read by a thread: no frame is late.
 
-    A device that was unplugged may block a read for ten seconds or hand out its last frame again (opencv #5221,
-    #14044): missing frames are detected here after `timeout_ns` of the caller's clock, repeated ones by `FrameChecks`.
-    Every `timeout_ns` the device is opened again.
+    The thread stores only the latest. A device that was unplugged may block a read for ten seconds or hand out its last
+    frame again (opencv #5221, #14044): missing frames are detected here after `timeout_ns` of the caller's clock,
+    repeated ones by `FrameChecks`. Every `timeout_ns` the device is opened again.
 
     Args:
-        path: /dev/v4l/by-id/... (stays the same when plugged in elsewhere), /dev/videoN, or N.
+        path: /dev/v4l/by-id/... (stays the same when plugged in elsewhere), /dev/videoN, N, or one of `URLS`.
         width_px, height_px, rate_hz: requested from the device.
         open_capture: opens a path; tests give a fake device.
     """
@@ -244,7 +249,8 @@ class DeviceFrames(FrameSource):
             cv2.CAP_PROP_BUFFERSIZE: 1.0,
         }
         self._timeout_ns = timeout_ns
-        self._open_capture = open_capture or _open_v4l2
+        self._name = without_password(self._path)
+        self._open_capture = open_capture or (_open_url if is_network_camera(path) else _open_v4l2)
         self._latest_ns: int | None = None
         self._index = 0
         self._reader = _Reader(self._open())
@@ -261,7 +267,7 @@ class DeviceFrames(FrameSource):
             self._latest_ns = now_ns
             self._reader = _Reader(self._open())
             raise FrameError(
-                f"camera {self._path} has given no frame for {no_data_ns / 1e9:.1f} s: replug it", "silent"
+                f"camera {self._name} has given no frame for {no_data_ns / 1e9:.1f} s: {self._remedy}", "silent"
             )
         self._latest_ns = now_ns
         self._index += 1
@@ -270,6 +276,10 @@ class DeviceFrames(FrameSource):
     def close(self) -> None:
         """Stop reading and release the device."""
         self._reader.stop()
+
+    @property
+    def _remedy(self) -> str:
+        return "check its power and the network" if is_network_camera(self._path) else "replug it"
 
     def _open(self) -> Capture:
         capture = self._open_capture(self._path)
@@ -328,7 +338,8 @@ def open_source(source: str, width_px: int, height_px: int, folder: Path = Path(
     if kind == "file" and rest:
         return FileFrames(Path(rest))
     if kind == "device" and rest:
-        return DeviceFrames(rest if rest.isdigit() else str(folder / rest), width_px, height_px)
+        is_complete = rest.isdigit() or is_network_camera(rest)
+        return DeviceFrames(rest if is_complete else str(folder / rest), width_px, height_px)
     if kind == "folder" and rest:
         path, _, rate = rest.rpartition("@")
         try:
@@ -340,6 +351,34 @@ def open_source(source: str, width_px: int, height_px: int, folder: Path = Path(
         path, _, topic = rest.rpartition("#")
         return RecordingFrames(Path(path), topic)
     raise SourceError(f"camera source {source!r}: {SOURCES} expected")
+
+
+def is_network_camera(path: str) -> bool:
+    """Whether a device is named by a URL. Raises SourceError for one of a kind that is not supported."""
+    if not re.match(r"[a-z][a-z0-9+.-]*://", path, re.IGNORECASE):
+        return False
+    if not path.lower().startswith(URLS):
+        raise SourceError(f"camera {without_password(path)}: {', '.join(URLS)} are supported, or a device's path")
+    return True
+
+
+def without_password(source: str) -> str:
+    """The same source as it may be printed and logged: of a URL without user and password."""
+    return re.sub(r"(?<=://)[^/?#]*@", "", source)
+
+
+def _open_url(url: str) -> Capture:
+    """Raises SourceError if there is no stream of images within `OPEN_TIMEOUT_MS`."""
+    timeouts = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, OPEN_TIMEOUT_MS, cv2.CAP_PROP_READ_TIMEOUT_MSEC, READ_TIMEOUT_MS]
+    capture = cv2.VideoCapture(url, cv2.CAP_FFMPEG, timeouts)
+    if not capture.isOpened():
+        capture.release()
+        raise SourceError(
+            f"network camera {without_password(url)} gives no stream of images within {1e-3 * OPEN_TIMEOUT_MS:g} s: it "
+            "must be switched on, in this network, and the address that of its MJPEG or RTSP stream, not of its page",
+            missing=True,
+        )
+    return capture
 
 
 def _offered(path: Path) -> Capture:

@@ -203,17 +203,20 @@ def _tell_agreement(placed: Sequence[Placement], board: Board) -> None:
 
 
 def _is_live(text: str) -> bool:
+    from paramove.cameras import is_network_camera
+
     text = text.removeprefix("device:")
-    return text.isdigit() or text.startswith("/dev/")
+    return text.isdigit() or text.startswith("/dev/") or is_network_camera(text)
 
 
 def _source(text: str, size: tuple[int, int], to_person: Prompts) -> ImageSource:
-    from paramove.cameras import LiveImages, file_source
+    from paramove.cameras import LiveImages, file_source, without_password
 
     text = text.removeprefix("device:").removeprefix("file:")
     if not _is_live(text):
         return file_source(Path(text))
-    name = f"camera{text}" if text.isdigit() else Path(text).name
+    host = re.match(r"\w+://([^/:?#]+)", without_password(text))
+    name = f"camera{text}" if text.isdigit() else host[1] if host else Path(text).name
     return LiveImages(name, _shown(begun(_live_frames(text, size)), to_person), to_person.prompt)
 
 

@@ -142,8 +142,10 @@ def person(
 
 
 def as_source(text: str) -> str:
-    """A camera may be named by its path or number alone."""
-    return f"device:{text}" if text.isdigit() or text.startswith("/dev/") else text
+    """A camera may be named by its path, number or URL alone."""
+    from paramove.cameras import is_network_camera
+
+    return f"device:{text}" if text.isdigit() or text.startswith("/dev/") or is_network_camera(text) else text
 
 
 def _measured(
