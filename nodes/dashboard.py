@@ -52,4 +52,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, SUBSCRIBES, PUBLISHES, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config, visitor=True)

@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Any, Literal, overload
 
 from paramove.bus import topics
+from paramove.bus.connecting import CONNECT_TIMEOUT_S
 from paramove.bus.exchange import Exchange, Marks
 from paramove.bus.lockstep import LockstepTicks, read_up_to
 from paramove.bus.settings import BusSettings
@@ -67,6 +68,7 @@ class Bus:
         self._held: list[tuple[Topic, Any, int | None]] = []
         self._tick: Tick | None = None
         self._frozen = False
+        self._connect_s = 0.0  # left for waiting until connected
         try:
             publishes = tuple(publishes)
             self._status = StatusReporter(self.exchange, node)
@@ -168,6 +170,29 @@ class Bus:
             assert isinstance(event, Received)
             yield event
 
+    def connect(self, timeout_s: float = CONNECT_TIMEOUT_S, visitor: bool = False) -> None:
+        """Waits until the node is connected with those that run already, so that neither misses a message of the other.
+
+        In lockstep the handshake at the first tick does that. What is subscribed to later is connected at `ready`.
+
+        Args:
+            timeout_s: Longest time, all in all. Nodes that are missing then are in the status.
+            visitor: Nobody waits for this node.
+        """
+        if not visitor:
+            self.exchange.announce(self._status.ownership)
+        self._connect_s = 0.0 if self.settings.lockstep else timeout_s
+        self._wait_until_connected()
+
+    def _wait_until_connected(self) -> None:
+        if self._connect_s <= 0.0:
+            return
+        began_s = time.monotonic()
+        self.exchange.connect(self._connect_s)
+        self._connect_s -= time.monotonic() - began_s
+        for node, names in self.exchange.unconnected().items():
+            _log.warning("not connected with %s yet (%s); what it misses is counted", node, ", ".join(names))
+
     def starting(self, message: str) -> None:
         """Publishes what the node is doing before it is ready."""
         self._status.change(NodeStatus.STATE_STARTING, message, self.now_ns)
@@ -176,6 +201,7 @@ class Bus:
         """Publishes that the node does its work, and how."""
         if not self._frozen:  # what is alive now stays alive: the collector can skip it
             self._frozen = True
+            self._wait_until_connected()
             gc.collect()
             gc.freeze()
         self._status.change(NodeStatus.STATE_READY, message, self.now_ns)

@@ -17,6 +17,7 @@ from typing import Any
 
 import zmq
 
+from paramove.bus.connecting import locked_inodes
 from paramove.bus.monitor import ForeignConnections
 from paramove.documents import checked_name
 
@@ -50,9 +51,10 @@ def socket_path(folder: Path, name: str) -> Path:
 def holder_of(path: Path) -> str:
     """What the holder of a socket path wrote into its lock, such as "pid 12 (camera)"; "" if nobody ever held it."""
     try:
-        return path.with_name(path.name + ".lock").read_text(encoding="utf-8", errors="replace")[:200].strip()
+        text = path.with_name(path.name + ".lock").read_text(encoding="utf-8", errors="replace")
     except OSError:
         return ""
+    return text.partition("\n")[0][:200].strip()
 
 
 def owner_of(path: Path) -> int | None:
@@ -64,13 +66,9 @@ def owner_of(path: Path) -> int | None:
 def is_held(path: Path) -> bool:
     """Whether a process holds the lock of the socket `path`, without touching lock or socket."""
     try:
-        lock = path.with_name(path.name + ".lock").stat()
-        held = Path("/proc/locks").read_text(encoding="ascii")
+        return path.with_name(path.name + ".lock").stat().st_ino in locked_inodes()
     except OSError:
         return False
-    # Not the device: on overlay and btrfs the kernel's list names another one than stat does.
-    locks = [line.split() for line in held.splitlines() if " FLOCK " in line]
-    return any(field.endswith(f":{lock.st_ino}") for fields in locks for field in fields)
 
 
 def prepare_folder(folder: Path) -> None:
@@ -109,14 +107,20 @@ class Ownership:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             _check_free(path)
         except BlockingIOError:
-            owner = os.pread(self._lock, 200, 0).decode(errors="replace").strip() or "a process that just started"
+            owner = holder_of(path) or "a process that just started"
             os.close(self._lock)
             raise TopicTakenError(f"{path.name} is already published by {owner}; a topic has one publisher") from None
         except BusFolderError:
             os.close(self._lock)
             raise
-        os.ftruncate(self._lock, 0)
-        os.pwrite(self._lock, f"pid {os.getpid()} ({holder})".encode(), 0)
+        self._holder = f"pid {os.getpid()} ({holder})\n"
+        self.write("")
+
+    def write(self, more: str) -> None:
+        """Writes who holds the lock and, from the second line on, `more` into the lock's file."""
+        content = (self._holder + more).encode()
+        os.pwrite(self._lock, content, 0)
+        os.ftruncate(self._lock, len(content))
 
     def release(self) -> None:
         """Gives the path up. The socket must be closed before: libzmq removes its file when it closes."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import zmq
 
+from paramove.bus.connecting import running_nodes, written
 from paramove.bus.endpoint import Ownership
 from paramove.bus.monitor import ForeignConnections
 from paramove.bus.publisher import Publisher
@@ -26,6 +27,7 @@ Marks = Mapping[str, tuple[int, int]]
 """Topic name on the bus -> epoch and sequence of the latest message published."""
 
 WATCH_PERIOD_S = 0.25
+_CONNECT_PERIOD_S = 0.05
 DRAIN_LIMIT = 1000
 """Messages taken from one topic at once, so that a flood on it does not block the process."""
 
@@ -57,6 +59,9 @@ class Exchange:
         self._watch_due_s = 0.0
         self._second_due_s = 0.0
         self._closed = False
+        self._announced: Ownership | None = None
+        self._forwarded: set[str] = set()
+        self._unconnected: list[tuple[str, str]] = []
 
     def advertise(self, topic: Topic) -> Publisher:
         """Becomes the publisher of a topic."""
@@ -66,17 +71,73 @@ class Exchange:
         self._foreign.append(publisher.foreign)
         self.publishers[topic.name] = publisher
         self._poller.register(publisher.socket, zmq.POLLIN)
+        self._write_topics()
         return publisher
 
     def subscribe(self, topic: Topic) -> Subscriber:
         """Subscribes to a topic; to do it again changes nothing."""
         if topic.name not in self.subscribers:
             settings = self.settings
-            subscriber = Subscriber(self.context, settings.folder_of(topic), topic, settings.name_of(topic))
+            subscriber = Subscriber(self.context, settings.folder_of(topic), topic, settings.name_of(topic), self.node)
             self.subscribers[topic.name] = subscriber
             self._pending[topic.name] = deque()
             self._poller.register(subscriber.socket, zmq.POLLIN)
+            self._write_topics()
         return self.subscribers[topic.name]
+
+    def announce(self, ownership: Ownership) -> None:
+        """From now on starting nodes wait until they are connected with this one; see `paramove.bus.connecting`.
+
+        Args:
+            ownership: Of the node's status topic.
+        """
+        self._announced = ownership
+        self._write_topics()
+
+    def forwards(self, subscribes: Iterable[str]) -> None:
+        """Announces topics, too, that other sockets of the node subscribe to under its name."""
+        self._forwarded.update(subscribes)
+        self._write_topics()
+
+    def connect(self, timeout_s: float) -> None:
+        """Waits until connected with all nodes that run already and share a topic, at most `timeout_s`.
+
+        Their subscriptions have arrived here, and their publishers have welcomed this node.
+        """
+        end_s = time.monotonic() + timeout_s
+        subscribed = {item.name for item in self.subscribers.values()}
+        published = {item.name for item in self.publishers.values()}
+        self._unconnected = [
+            (other.node, name)
+            for other in running_nodes(self.settings.folder)
+            for name in sorted((other.subscribes & published) | (other.publishes & subscribed))
+            if other.node != self.node
+        ]
+        while self.unconnected() and not self.stopped and (left_s := end_s - time.monotonic()) > 0:
+            self.wait(min(left_s, _CONNECT_PERIOD_S))
+
+    def unconnected(self) -> dict[str, list[str]]:
+        """Node -> topics of those that `connect` waited for in vain, and that still run."""
+        if not self._unconnected:
+            return {}
+        connected = {item.name for item in self.subscribers.values() if item.welcomed}
+        by_publisher = {item.name: item.subscribers for item in self.publishers.values()}
+        running = {other.node for other in running_nodes(self.settings.folder)}
+        self._unconnected = [
+            (node, name)
+            for node, name in self._unconnected
+            if node in running and name not in connected and node not in by_publisher.get(name, ())
+        ]
+        missing: dict[str, list[str]] = {}
+        for node, name in self._unconnected:
+            missing.setdefault(node, []).append(name)
+        return missing
+
+    def _write_topics(self) -> None:
+        if self._announced is not None:
+            subscribes = self._forwarded.union(item.name for item in self.subscribers.values())
+            publishes = {item.name for item in self.publishers.values()}
+            self._announced.write(written(subscribes, publishes))
 
     def add_socket(
         self,

@@ -97,6 +97,7 @@ def main(
     subscribes: Sequence[Topic],
     publishes: Sequence[Topic],
     config_type: type[Config],
+    visitor: bool = False,
 ) -> None:
     """Runs a node and exits the process.
 
@@ -105,6 +106,7 @@ def main(
         subscribes: Topics that the node subscribes to.
         publishes: Topics that it publishes.
         config_type: Its parameters.
+        visitor: Whether other nodes are ready without being connected with it; see `Bus.connect`.
     """
     parser = argparse.ArgumentParser(description=sys.modules[run.__module__].__doc__)
     parser.add_argument("--config", type=Path, required=True, help="YAML file written by the supervisor")
@@ -124,18 +126,19 @@ def main(
         _log.error("%s", error)
         sys.exit(exit_codes.CONFIGURATION)
     with bus:
-        code = _run(run, bus, config)
+        code = _run(run, bus, config, visitor)
         if code != exit_codes.OK:
             bus.wait_for_subscriber(LAST_STATUS_TIMEOUT_S)
         sys.exit(code)
 
 
-def _run(run: Callable[[Bus, Config], None], bus: Bus, config: Config) -> int:
+def _run(run: Callable[[Bus, Config], None], bus: Bus, config: Config, visitor: bool) -> int:
     """Calls `run` with the signals tied to the bus; returns the exit code."""
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: bus.stop())
     try:
         bus.starting("starting")
+        bus.connect(visitor=visitor)
         run(bus, config)
     except InputError as error:
         _log.error("%s", error)

@@ -42,6 +42,7 @@ class Publisher:
         epoch: Of this start.
         sequence: Of the latest message published.
         subscriptions: How many have been answered since the start.
+        subscribers: Nodes that are subscribed now.
         foreign: Connections that did not speak ZeroMQ; `foreign.look()` is to be called a few times a second.
 
     Raises:
@@ -56,6 +57,7 @@ class Publisher:
         self.epoch = secrets.randbits(32)
         self.sequence = 0
         self.subscriptions = 0
+        self.subscribers: set[str] = set()
         prepare_folder(folder)
         self._frame = self.name.encode() + b"\0"
         self._schema = schema_hash(topic.type)
@@ -107,7 +109,7 @@ class Publisher:
         """Answers the subscriptions that have come in since the last call."""
         before = self.subscriptions
         while can_read(self.socket):
-            self.subscriptions += self.socket.recv(zmq.NOBLOCK)[:1] == b"\x01"
+            self._handle(self.socket.recv(zmq.NOBLOCK))
         if self.subscriptions > before:
             self._welcome()
 
@@ -117,6 +119,18 @@ class Publisher:
         self.socket.close()
         if self._ring is not None:
             self._ring.close()
+
+    def _handle(self, subscription: bytes) -> None:
+        """Handles a subscription or, after the last of its kind has gone, its end."""
+        begins, frame = subscription[:1] == b"\x01", subscription[1:]
+        if not frame.startswith(self._frame + b"\0"):
+            self.subscriptions += begins
+            return
+        node = frame[len(self._frame) + 1 :].decode("utf-8", "replace")
+        if begins:
+            self.subscribers.add(node)
+        else:
+            self.subscribers.discard(node)
 
     def _welcome(self) -> None:
         if self._last is not None:

@@ -20,11 +20,12 @@ class Arrival(enum.Enum):
 class SequenceCounter:
     """Follows one topic.
 
-    The first message of an epoch, usually a welcome, is the baseline: what was published before it does not count. From
-    there on every gap is a loss, and a later welcome also reveals a loss at the end. A new epoch is a restarted
-    publisher, hence a new baseline and no loss.
+    What was published before a subscriber came is no loss: the first message, usually a welcome, is the baseline.
+    From there on every gap is a loss, and a later welcome also reveals a loss at the end. A publisher that came, or was
+    restarted, while the subscriber was there is counted from its first message.
 
     Attributes:
+        from_first: Whether the subscriber was there before its first publisher.
         epoch: Of the present publisher; None until something was received.
         sequence: Latest of that epoch.
         messages: Messages received, each counted once.
@@ -35,6 +36,7 @@ class SequenceCounter:
     """
 
     def __init__(self) -> None:
+        self.from_first = False
         self.epoch: int | None = None
         self.sequence = 0
         self.messages = 0
@@ -53,6 +55,8 @@ class SequenceCounter:
         if first:
             if self.epoch is not None:
                 self._past.add(self.epoch)
+            if self.epoch is not None or self.from_first:
+                self.lost += max(0, envelope.sequence - int(envelope.has_message))
             self.epoch = envelope.epoch
             self.epochs += 1
         elif envelope.sequence <= self.sequence:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 
+from paramove.bus.endpoint import Ownership
 from paramove.bus.exchange import Exchange
 from paramove.bus.sequence import SequenceCounter
 from paramove.bus.topics import status
@@ -36,6 +37,11 @@ class StatusReporter:
         self.processed = 0
 
     @property
+    def ownership(self) -> Ownership:
+        """Of the status topic."""
+        return self._publisher.ownership
+
+    @property
     def has_subscriber(self) -> bool:
         """Whether anybody has subscribed; from then on the latest state has been sent, as the topic is latched."""
         return self._publisher.subscriptions > 0
@@ -54,7 +60,7 @@ class StatusReporter:
         status_message = NodeStatus(
             node=self._node,
             state=self.state,
-            detail=self._message,
+            detail=self._message + self._unconnected(),
             pid=os.getpid(),
             processing_seconds=self.processing_ns * 1e-9,
             processed=self.processed,
@@ -65,6 +71,10 @@ class StatusReporter:
         for subscriber in self._exchange.subscribers.values():
             status_message.received.append(_count(subscriber.name, subscriber.counter))
         self._publisher.publish(status_message, now_ns, now_ns)
+
+    def _unconnected(self) -> str:
+        missing = [f"{node} ({', '.join(names)})" for node, names in self._exchange.unconnected().items()]
+        return f"; not connected with {', '.join(missing)}" if missing else ""
 
 
 def _count(name: str, counter: SequenceCounter) -> TopicCount:

@@ -12,6 +12,7 @@ import zmq
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 
 from paramove.bus.budget import ALLOWANCE, BURST, RateBudget
+from paramove.bus.connecting import file_identity
 from paramove.bus.endpoint import holder_of, socket_path
 from paramove.bus.envelope import FLAG_RING, SIZE, Envelope, Reason, RejectedError, unpack
 from paramove.bus.image_ring import OverwrittenError, RingReader
@@ -21,6 +22,7 @@ from paramove.bus.schemas import schema_hash
 from paramove.bus.sequence import Arrival, SequenceCounter
 from paramove.bus.soundness import unsound
 from paramove.bus.topics import Topic
+from paramove.msgs.node_status_pb2 import NodeStatus
 
 _log = logging.getLogger(__name__)
 
@@ -63,9 +65,12 @@ class Subscriber:
         folder: Bus folder.
         topic: Row of the table.
         name: Name on the bus where it differs from the topic's (a remap).
+        node: Name of the node, by which the publisher knows who has subscribed; "" for a visitor of the bus.
     """
 
-    def __init__(self, context: zmq.Context[Any], folder: Path, topic: Topic, name: str | None = None) -> None:
+    def __init__(
+        self, context: zmq.Context[Any], folder: Path, topic: Topic, name: str | None = None, node: str = ""
+    ) -> None:
         self.topic = topic
         self.name = name or topic.name
         self.counter = SequenceCounter()
@@ -75,6 +80,9 @@ class Subscriber:
         self._budget = RateBudget(topic.budget_hz)
         self._frame = self.name.encode() + b"\0"
         self._schema = schema_hash(topic.type)
+        # A message begins with the topic's frame and a header, never with this: it only names who has subscribed.
+        self._mark = self._frame + b"\0" + node.encode() if node else b""
+        self._found = file_identity(self._path)
         self._disconnected_s: float | None = None
         self._ring = RingReader()
         self._open()
@@ -127,6 +135,8 @@ class Subscriber:
                 continue
             except zmq.Again:
                 return None
+            if self.counter.epoch is None and self.topic.type is not NodeStatus:  # of a status the last one is enough
+                self.counter.from_first = file_identity(self._path) != self._found
             arrival = self.counter.accept(envelope)
             if arrival is Arrival.NEW:
                 return envelope, payload
@@ -192,6 +202,8 @@ class Subscriber:
         )
         self.socket.connect(f"ipc://{self._path}")
         self.socket.setsockopt(zmq.SUBSCRIBE, self._frame)
+        if self._mark:
+            self.socket.setsockopt(zmq.SUBSCRIBE, self._mark)
 
     def _read(self) -> tuple[Envelope, bytes]:
         """The next message, its sequence and content unchecked; raises RejectedError."""

@@ -109,12 +109,13 @@ class Relay:
             rows = {name: topics.by_name(row) for name, row in {**peer.wants, **peer.gives}.items()}
             self._topics |= rows
             for name in peer.wants.keys() - self._sources.keys():  # a topic may cross to several hosts
-                self._sources[name] = _Source(self._here, bus.settings.folder, rows[name], name)
+                self._sources[name] = _Source(self._here, bus, rows[name], name)
             images = frozenset(name for name in peer.gives if rows[name].is_image)
             self._requests[host] = (
                 Request(away, peer.port, own, peer, frozenset(peer.gives) - images, beat_s),
                 Request(away, peer.port + 1, own, peer, images),
             )
+        bus.exchange.forwards(self._sources)
         self._answers: _Answers | None = None
         if settings.clock_from is not None:
             self._answers = _Answers(self._here, bus)
@@ -323,9 +324,9 @@ def _about(clock: ClockOffset) -> str:
 class _Source:
     """One topic of this host, as it is published."""
 
-    def __init__(self, context: zmq.Context[Any], folder: Any, topic: Topic, name: str) -> None:
+    def __init__(self, context: zmq.Context[Any], bus: Bus, topic: Topic, name: str) -> None:
         self.topic, self.name = topic, name
-        self.subscriber = Subscriber(context, folder, topic, name)
+        self.subscriber = Subscriber(context, bus.settings.folder, topic, name, bus.node)
         self._known: tuple[int | None, int] = (None, 0)
         self._last: tuple[Envelope, bytes] | None = None
 
