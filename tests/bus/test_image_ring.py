@@ -179,7 +179,6 @@ def test_a_slot_that_is_being_written_is_not_read(monkeypatch: pytest.MonkeyPatc
         (b"", Reason.LENGTH),
         (b"x" * 39, Reason.LENGTH),
         (image_ring._HANDLE.pack(image_ring._pid_namespace(), 1, 0, 1, 0, 2**40), Reason.LENGTH),
-        (image_ring._HANDLE.pack(image_ring._pid_namespace(), 1, 0, 1, 2**64 - 1, 10), Reason.LENGTH),
         (image_ring._HANDLE.pack(12, 1, 0, 1, 0, 10), Reason.RING),
     ],
 )
@@ -187,6 +186,29 @@ def test_a_damaged_or_unreachable_handle_is_rejected(handle: bytes, reason: Reas
     with pytest.raises(RejectedError) as refused:
         RingReader().read(handle, envelope(1), 2**20)
     assert refused.value.reason is reason
+
+
+OFFSETS = [0, 4096 * 99, 2**31, 2**62, 2**63 - 17, 2**63 - 16, 2**63 - 1, 2**63, 2**64 - 16, 2**64 - 1]
+
+
+def test_a_handle_of_any_offset_and_length_is_rejected_and_counted(context: Context, folder: Path, wait: Wait) -> None:
+    writer = RingWriter()
+    namespace, process, descriptor, number, _, _ = image_ring._HANDLE.unpack(writer.write(b"a" * 4000, envelope(1, 1)))
+    other, subscriber = RawPublisher(context, folder, TOPIC), Subscriber(context, folder, TOPIC)
+    wait(other.subscribed)
+    other.say(b"")
+    assert wait(subscriber.receive).sequence == 1
+    for offset in OFFSETS:
+        for length in (0, 10, TOPIC.max_bytes, 2**64 - 1):
+            fits = offset + length < 2**16
+            handle = image_ring._HANDLE.pack(namespace, process, descriptor, number, offset, length)
+            before = subscriber.counter.rejected.total()
+            other.say(handle, other.sequence * 10**9, flags=FLAG_RING)
+            other.say(b"", other.sequence * 10**9)
+            assert wait(subscriber.receive).sequence == other.sequence
+            assert subscriber.counter.rejected.total() == before + (not fits), (offset, length)
+    subscriber.close()
+    writer.close()
 
 
 def test_any_other_file_is_not_read(tmp_path: Path) -> None:

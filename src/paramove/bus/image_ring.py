@@ -77,6 +77,7 @@ class RingReader:
 
     def __init__(self) -> None:
         self._file = -1
+        self._bytes = 0
         self._opened: tuple[int, int] | None = None
 
     def read(self, handle: bytes, envelope: Envelope, max_bytes: int) -> bytes:
@@ -89,11 +90,15 @@ class RingReader:
         if len(handle) != _HANDLE.size:
             raise RejectedError(Reason.LENGTH, f"a handle has {_HANDLE.size} bytes, found {len(handle)}")
         namespace, process, descriptor, number, offset, length = _HANDLE.unpack(handle)
-        if length > max_bytes or offset >= 2**63:
-            raise RejectedError(Reason.LENGTH, f"a handle of {length} bytes at {offset}, allowed are {max_bytes}")
+        if length > max_bytes:
+            raise RejectedError(Reason.LENGTH, f"a handle of {length} bytes, allowed are {max_bytes}")
         if self._opened != (envelope.epoch, number):
             self._open(namespace, process, descriptor)
             self._opened = (envelope.epoch, number)
+        if offset + _SLOT.size + length > self._bytes:
+            raise RejectedError(
+                Reason.LENGTH, f"a handle of {length} bytes at {offset}, behind the end of a ring of {self._bytes}"
+            )
         payload = os.pread(self._file, length, offset + _SLOT.size)
         if os.pread(self._file, _SLOT.size, offset) != _SLOT.pack(envelope.epoch, 0, envelope.sequence):
             raise OverwrittenError
@@ -120,6 +125,7 @@ class RingReader:
             if not os.readlink(path).startswith(f"/memfd:{_NAME}"):
                 raise OverwrittenError  # the publisher has ended, and another process has its number
             self._file = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+            self._bytes = os.fstat(self._file).st_size
         except FileNotFoundError:
             raise OverwrittenError from None
         except OSError as error:
