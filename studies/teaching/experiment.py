@@ -15,7 +15,7 @@ from paramove.demonstrations import RESTING_SHOULDER, DemonstrationSet, TaughtSe
 from paramove.documents import Floats
 from paramove.observation import BodyKeyPoints, WebcamTeacher, board_targets
 from paramove.phmm import ParametricHMM
-from paramove.training import examples_of, train_and_write, untrained
+from paramove.training import examples_of, train, untrained
 from sim.performances_scene import looking
 from studies.teaching.simulated_person import RATE_HZ, SIZES, key_points, mean_path, movement
 
@@ -78,7 +78,9 @@ def trained(folder: Path) -> ParametricHMM:
     examples = examples_of(DemonstrationSet.load(folder), action=ACTION)
     description, floor = examples.description(ACTION), examples.floor_deviation
     make = {ACTION: lambda: untrained("best", description=description, floor_deviation=floor)}
-    return train_and_write(examples, make, folder / "model.npz")[0].model
+    training = train(examples, make, folder / "model.npz")
+    training.write()
+    return training.trained[0].model
 
 
 def errors_cm(model: ParametricHMM, seed: int) -> dict[str, float]:

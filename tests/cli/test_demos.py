@@ -203,3 +203,15 @@ def test_a_name_that_is_a_path_is_rejected_at_import_and_labelling(csv, tmp_path
     rejected(78, "label", folder, "--recording", name, "--action", "reaching", "--find")
     rejected(78, "label", folder, "--recording", name, "--action", "reaching", "--start", 0.2, "--end", 1.5)
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_import_names_a_take_in_another_unit(csv, tmp_path):
+    arguments = ("--to", tmp_path / "set", "--action", "reaching", "--theta", "0.4,0.1,-0.1")
+    good("import", csv, "--unit", "mm", *arguments)
+    good("import", csv, "--unit", "mm", *arguments, "--add", "--name", "second")
+    done = run("import", csv, "--unit", "m", *arguments, "--add", "--name", "third")
+    assert done.exit_code == 0
+    assert "third.mcap" in done.stderr
+    assert "millimetres?" in done.stderr
+    done = run("import", csv, "--to", tmp_path / "theta", "--unit", "mm", "--action", "a", "--theta", "400,100,-100")
+    assert "target_x is 400 ... 400" in done.stderr

@@ -1,10 +1,12 @@
 """`paramove train`: what it says, writes and refuses."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from paramove.demonstrations import DemonstrationSet
 from paramove.phmm import InterpolativePHMM, LinearPHMM, MovementClassifier, ParametricHMM, QuadraticPHMM
 from tests.cli.conftest import call
 from tests.demonstrations.movements import a_set
@@ -166,3 +168,30 @@ def test_an_interrupted_check_leaves_the_model(trained, tmp_path, monkeypatch):
     monkeypatch.setattr("paramove.training.training.leave_out", interrupted)
     assert "but not its accuracy" in rejected(130, trained.table, "--out", tmp_path / "a.npz", *QUICK)
     assert np.isfinite(ParametricHMM.load(tmp_path / "a.npz").state_means([0.1, 0.0])).all()
+
+
+def test_a_training_that_fails_leaves_the_good_model(trained, tmp_path, monkeypatch):
+    file = tmp_path / "a.npz"
+    good(trained.table, "--out", file, "--leave-out", "none", *QUICK)
+    before = file.read_bytes()
+
+    def failed(*arguments):
+        raise ValueError("a fold cannot be trained")
+
+    monkeypatch.setattr("paramove.training.training.leave_out", failed)
+    assert "nothing was written" in rejected(78, trained.table, "--out", file, "--states", 8, "--frames", 50)
+    assert file.read_bytes() == before
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["a.npz", "a.training.json"]
+
+
+def test_odd_movements_are_named_and_spoiling_ones_rejected(trained, tmp_path):
+    movements = list(DemonstrationSet.load(trained.table))
+    odd = [replace(one, theta=movements[20].theta) if n == 4 else one for n, one in enumerate(movements)]
+    DemonstrationSet(tuple(odd)).write(tmp_path / "label")
+    done = good(tmp_path / "label", "--out", tmp_path / "a.npz", "--leave-out", "none", *QUICK)
+    assert "is it labelled correctly" in done.stderr
+    before = (tmp_path / "a.npz").read_bytes()
+    odd = [replace(one, positions=1e3 * one.positions) if n == 4 else one for n, one in enumerate(movements)]
+    DemonstrationSet(tuple(odd)).write(tmp_path / "unit")
+    assert "millimetres" in rejected(78, tmp_path / "unit", "--out", tmp_path / "a.npz", *QUICK)
+    assert (tmp_path / "a.npz").read_bytes() == before

@@ -23,7 +23,7 @@ from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.training.examples import examples_of
 from paramove.training.kinds import untrained
-from paramove.training.training import train_and_write
+from paramove.training.training import train
 from tests.robots.dynamixel.koch_arm import KOCH
 
 ROBOT = RobotDescription.load(KOCH.parent / "open_manipulator_x")
@@ -100,7 +100,7 @@ def model_file(taught):
         )
     }
     file = taught.with_name("reaching.npz")
-    train_and_write(examples, make, file)
+    train(examples, make, file).write()
     return file
 
 

@@ -163,11 +163,24 @@ def _write(
             takes.append(replace(take, labels=labels))
     write_set(to, takes, names, max_gap=max_gap, add=add)
     _print_remarks(results)
+    _print_oddities(to)
     count = sum(len(take.labels) for take in takes)
     recordings = len({take.recording for take in takes})
     typer.echo(f"{to}: {count} movements in {recordings} recording{'' if recordings == 1 else 's'}")
     if not count:
         typer.echo(f"nothing is labelled yet: paramove demos label {to} --recording {takes[0].recording} --help")
+
+
+def _print_oddities(to: Path) -> None:
+    """Names what hardly fits in the set as it is now; a set that cannot be read is reported by those who read it."""
+    from paramove.demonstrations import DemonstrationError, DemonstrationSet, oddities
+
+    try:
+        movements = DemonstrationSet.load(to)
+    except DemonstrationError:
+        return
+    for oddity in oddities(movements):
+        typer.echo(f"warning: {printable(oddity.message)}", err=True)
 
 
 def _counted(labels: tuple[Label, ...], there: dict[tuple[object, ...], int]) -> tuple[Label, ...]:

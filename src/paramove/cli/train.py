@@ -19,7 +19,7 @@ from paramove.documents import InputError, checked_name, exit_codes, printable
 from paramove.training import DEFAULT_FRAMES, DEFAULT_STATES, Kind
 
 if TYPE_CHECKING:
-    from paramove.training import Examples, Make, Trained
+    from paramove.training import Examples, LeftOutBy, Make, Trained, Training
 
 app = typer.Typer(add_completion=False)
 
@@ -56,7 +56,8 @@ def train(
 ) -> None:
     """Train a movement model from a demonstration set; of several actions one each, and a classifier of all.
 
-    The same command again gives the same model and replaces the file. Ctrl-C leaves no half of one.
+    The same command again gives the same model and replaces the file. A training that fails leaves an earlier model as
+    it is; Ctrl-C leaves no half of one.
 
     Exit codes: 0; 2 wrong arguments; 66 there is no set; 78 nothing can be learned from it; 130 interrupted.
     """
@@ -107,32 +108,47 @@ def _goal(out: Path | None, folder: Path, examples: Examples) -> Path:
 def _trained(
     examples: Examples, make: dict[str, Make], goal: Path, leave_out: LeaveOut, console: Console
 ) -> list[Trained]:
-    """Trains, writes, and then checks, so that an interrupted check leaves a model."""
-    from paramove.training import train_and_write, with_check
+    """Trains, checks, and then writes: a training that fails leaves an earlier model as it is.
+
+    An interrupted check leaves the new model, without the result of the check.
+    """
+    from paramove.training import train as train_models
 
     written = "nothing was written"
     try:
         with console.status("training: " + ", ".join(examples.actions)):
-            trained = train_and_write(examples, make, goal)
-        written = f"{goal} was written, but not its accuracy on data that it was not trained with"
-        if leave_out == "none":
-            return trained
-        with Progress(*PROGRESS, console=console, transient=True) as progress:
-            result = []
-            for one in trained:
-                task_id = progress.add_task(f"without each {leave_out}: {one.action}", total=None)
-
-                def report(done: int, total: int, task: TaskID = task_id) -> None:
-                    progress.update(task, completed=done, total=total)
-
-                result.append(with_check(one, make[one.action], leave_out, report))
-            return result
+            training = train_models(examples, make, goal)
+        if leave_out != "none":
+            try:
+                training = _checked(training, make, leave_out, console)
+            except KeyboardInterrupt:
+                training.write()
+                written = f"{goal} was written, but not its accuracy on data that it was not trained with"
+                raise
+        training.write()
+        return list(training.trained)
     except KeyboardInterrupt:
         raise ended(f"interrupted: {written}", exit_codes.CTRL_C) from None
     except InputError:
         raise
     except ValueError as error:
-        raise InputError(f"nothing can be learned so: {_with_points(str(error), examples.point_names)}") from error
+        raise InputError(
+            f"nothing can be learned so, and {written}: {_with_points(str(error), examples.point_names)}"
+        ) from error
+
+
+def _checked(training: Training, make: dict[str, Make], leave_out: LeftOutBy, console: Console) -> Training:
+    """The training with its cross-validation, whose progress is shown."""
+    with Progress(*PROGRESS, console=console, transient=True) as progress:
+        tasks: dict[str, TaskID] = {
+            one.action: progress.add_task(f"without each {leave_out}: {one.action}", total=None)
+            for one in training.trained
+        }
+
+        def report(action: str, done: int, total: int) -> None:
+            progress.update(tasks[action], completed=done, total=total)
+
+        return training.checked(make, leave_out, report)
 
 
 def _with_points(message: str, names: tuple[str, ...]) -> str:

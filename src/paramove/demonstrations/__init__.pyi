@@ -49,6 +49,8 @@ from .movement import position_in_theta as position_in_theta
 from .movement import runs as runs
 from .movement_ends import FRAMES as FRAMES
 from .movement_ends import last_parts as last_parts
+from .oddities import Oddity as Oddity
+from .oddities import oddities as oddities
 from .plots import embedded as embedded
 from .plots import new_figure as new_figure
 from .plots import plot_set as plot_set

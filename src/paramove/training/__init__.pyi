@@ -15,6 +15,7 @@ from .kinds import DEFAULT_STATES as DEFAULT_STATES
 from .kinds import Kind as Kind
 from .kinds import kind_of as kind_of
 from .kinds import untrained as untrained
+from .leaving_out import LeftOutBy as LeftOutBy
 from .movement_writing import ENDINGS as ENDINGS
 from .movement_writing import Made as Made
 from .movement_writing import as_csv as as_csv
@@ -34,7 +35,7 @@ from .report import sentences as sentences
 from .report import write_training_report as write_training_report
 from .training import Make as Make
 from .training import Trained as Trained
+from .training import Training as Training
 from .training import checksum as checksum
-from .training import train_and_write as train_and_write
+from .training import train as train
 from .training import training_facts as training_facts
-from .training import with_check as with_check

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paramove.demonstrations import AXIS_ENDINGS, DemonstrationError, DemonstrationSet
+from paramove.demonstrations import AXIS_ENDINGS, DemonstrationError, DemonstrationSet, oddities
 from paramove.documents import Floats, nearest
 from paramove.phmm import MovementDescription
 from paramove.robots import ARM_BASE
@@ -133,9 +133,14 @@ def examples_of(
         body: transform everything into the person's frame, left arms as right ones.
         source: of the set, for the description.
 
-    Raises DemonstrationError if there is no such action or parameter, or if no parameter varies.
+    Raises DemonstrationError if there is no such action or parameter, if no parameter varies, or if a movement is so
+    odd that no model can be learned with it (`oddities`); others that hardly fit are named in the remarks.
     """
     chosen = demonstrations.select(action)
+    odd = oddities(chosen)
+    spoiling = [oddity.message for oddity in odd if oddity.spoils]
+    if spoiling:
+        raise DemonstrationError("; ".join(spoiling) + ". Import it again, or remove it from labels.yaml")
     if body:
         chosen = chosen.in_body_frame().with_right_arms()
     rate_hz = float(f"{np.median([movement.rate_hz for movement in chosen]):.4g}")
@@ -146,7 +151,7 @@ def examples_of(
         sequences=arrays.sequences, theta=arrays.theta[:, columns], labels=arrays.labels, subjects=arrays.subjects,
         parameter_names=tuple(chosen.parameter_names[column] for column in columns), point_names=chosen.point_names,
         frame=chosen.frame, rate_hz=rate_hz, source=demonstrations.description or source,
-        remarks=(*demonstrations.remarks, *remarks),
+        remarks=(*demonstrations.remarks, *(oddity.message for oddity in odd), *remarks),
     )  # fmt: skip
 
 

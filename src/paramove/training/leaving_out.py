@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from scipy.spatial import Delaunay, QhullError
 from paramove.alignment import movement_distance
 from paramove.documents import Floats
 from paramove.hmm import resample
-from paramove.phmm import InterpolativePHMM, ParametricHMM, groups_of
+from paramove.phmm import InterpolativePHMM, ParametricHMM, UnlikelyMovementWarning, groups_of
 from paramove.training.examples import Examples, is_place
 from paramove.training.plots import levels_of
 
@@ -140,7 +141,9 @@ def _folds(examples: Examples, by: LeftOutBy) -> list[list[int]]:
 
 def _tested(model: ParametricHMM, examples: Examples, number: int, rest: Examples) -> LeftOut:
     sequence, theta = examples.sequences[number], examples.theta[number]
-    estimate = model.estimate(sequence)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnlikelyMovementWarning)  # what hardly fits was named before the training
+        estimate = model.estimate(sequence)
     return LeftOut(
         number,
         theta,

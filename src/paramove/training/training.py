@@ -7,6 +7,7 @@ import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -75,16 +76,48 @@ class Trained:
         return facts
 
 
-def train_and_write(examples: Examples, make: Mapping[str, Make], goal: Path) -> list[Trained]:
-    """Train and write: for one action a model file, for several a folder with the classifier of all.
+@dataclass(frozen=True)
+class Training:
+    """Trained models that are not written yet.
+
+    Attributes:
+        trained: the model of each action.
+        whole: what is written: the model, or the classifier of all.
+        goal: file or folder.
+    """
+
+    trained: tuple[Trained, ...]
+    whole: ParametricHMM | MovementClassifier
+    goal: Path
+
+    def checked(self, make: Mapping[str, Make], by: LeftOutBy, finished: Callable[[str, int, int], None]) -> Training:
+        """The same with the result of the cross-validation (`leave_out`) of each model.
+
+        `finished` is called with the action, the finished folds and all folds. Raises ValueError if a fold cannot be
+        trained.
+        """
+        return replace(self, trained=tuple(
+            replace(one, left_out=leave_out(one.examples, make[one.action], by, partial(finished, one.action)))
+            for one in self.trained
+        ))  # fmt: skip
+
+    def write(self) -> None:
+        """Write models and facts. Files appear when they are complete; raises OSError if nothing can be written."""
+        self.goal.parent.mkdir(parents=True, exist_ok=True)
+        self.whole.save(self.goal)
+        for one in self.trained:
+            _write_facts(one)
+
+
+def train(examples: Examples, make: Mapping[str, Make], goal: Path) -> Training:
+    """Train a model of one action, or models of several and their classifier; nothing is written.
 
     Args:
         examples: of all actions.
         make: gives the untrained model of each.
-        goal: file or folder. Files appear when they are complete.
+        goal: file of one model, or folder of the classifier.
 
-    Raises ValueError for examples that do not fit, InputError for an action whose name cannot be that of a file,
-    OSError if nothing can be written.
+    Raises ValueError for examples that do not fit, InputError for the name of an action that no file can have.
     """
     for action in examples.actions:
         checked_name(action, "action")
@@ -92,30 +125,19 @@ def train_and_write(examples: Examples, make: Mapping[str, Make], goal: Path) ->
     if len(examples.actions) == 1:
         (one,) = make.values()
         model = one().fit(examples.sequences, examples.theta, examples.groups)
-        trained = [Trained(model, examples, time.perf_counter() - began_s, goal)]
-        goal.parent.mkdir(parents=True, exist_ok=True)
-        model.save(goal)
-    else:
-        untrained = {action: one() for action, one in make.items()}
-        classifier = MovementClassifier(untrained)
-        classifier.fit(examples.sequences, examples.theta, examples.labels, examples.groups)
-        seconds = time.perf_counter() - began_s
-        classifier.save(goal)
-        files = {action: goal / f"{action}.model.npz" for action in classifier.classes_}
-        trained = [
-            Trained(model, examples.of_action(action), seconds, files[action])
+        trained = Trained(model, examples, time.perf_counter() - began_s, goal)
+        return Training((trained,), model, goal)
+    classifier = MovementClassifier({action: one() for action, one in make.items()})
+    classifier.fit(examples.sequences, examples.theta, examples.labels, examples.groups)
+    seconds = time.perf_counter() - began_s
+    return Training(
+        tuple(
+            Trained(model, examples.of_action(action), seconds, goal / f"{action}.model.npz")
             for action, model in classifier.models_.items()
-        ]
-    for one_trained in trained:
-        _write_facts(one_trained)
-    return trained
-
-
-def with_check(trained: Trained, make: Make, by: LeftOutBy, finished: Callable[[int, int], None]) -> Trained:
-    """The same with the result of the cross-validation (`leave_out`), which is also written."""
-    checked = replace(trained, left_out=leave_out(trained.examples, make, by, finished))
-    _write_facts(checked)
-    return checked
+        ),
+        classifier,
+        goal,
+    )
 
 
 def training_facts(file: Path) -> dict[str, Any] | None:

@@ -8,7 +8,7 @@ from paramove.demonstrations import DemonstrationSet
 from paramove.motion.reaching_file import load_reaching_model
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.robots import RobotDescription
-from paramove.training import examples_of, train_and_write, untrained
+from paramove.training import examples_of, train, untrained
 from studies.teaching.experiment import ACTION, along, cameras, run, taught
 from studies.teaching.simulated_person import RATE_HZ, key_points, mean_path, movement
 
@@ -29,7 +29,7 @@ def test_a_robot_executes_what_two_cameras_saw(tmp_path):
     examples = examples_of(DemonstrationSet.load(folder), action=ACTION, body=True)
     description, floor = examples.description(ACTION), examples.floor_deviation
     make = {ACTION: lambda: untrained("best", description=description, floor_deviation=floor)}
-    train_and_write(examples, make, tmp_path / "body.npz")
+    train(examples, make, tmp_path / "body.npz").write()
     motion = ServoArmReaching(RobotDescription.load(ROBOT), load_reaching_model(tmp_path / "body.npz")).reach(target)
     np.testing.assert_allclose(motion.gripper[-1], target, rtol=0.0, atol=1e-3)
 
