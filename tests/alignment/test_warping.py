@@ -94,3 +94,14 @@ def test_what_cannot_be_aligned_is_refused_with_its_reason() -> None:
         warp(np.zeros((3, 2)), np.zeros((3, 3)))
     with pytest.raises(ValueError, match="not finite"):
         warp(np.array([[0.0], [np.nan]]), np.zeros((2, 1)))
+
+
+@pytest.mark.parametrize("count", [1, 7, 21])
+def test_the_number_of_points_follows_from_the_frames(count: int) -> None:
+    movement = np.random.default_rng(0).normal(size=(30, 3 * count)).cumsum(axis=0)
+    shifted = movement + np.tile([0.03, 0.0, 0.0], count)
+    assert_allclose(movement_distance(movement, shifted), 0.03, rtol=1e-9, atol=0.0)
+    with pytest.raises(ValueError, match="give n_points"):
+        movement_distance(movement, shifted, n_points=3 * count + 1)
+    with pytest.raises(ValueError, match="give n_points"):
+        movement_distance(movement[:, :-1], shifted[:, :-1])

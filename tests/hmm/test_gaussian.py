@@ -301,3 +301,15 @@ def test_a_covariance_that_maximum_likelihood_makes_singular_is_named() -> None:
 def test_untrained_models_say_so() -> None:
     with pytest.raises(RuntimeError, match="call fit or with_parameters"):
         GaussianHMM(3).log_likelihood(np.zeros((5, 2)))
+
+
+def test_an_ergodic_chain_finds_states_that_come_again() -> None:
+    """Three poses, visited in any order: equal parts of the sequences would mix them."""
+    rng = np.random.default_rng(0)
+    places = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    visits = [np.repeat(rng.permutation(np.repeat(np.arange(3), 4)), 10) for _ in range(6)]
+    sequences = [places[one] + rng.normal(0.0, 0.05, (len(one), 2)) for one in visits]
+    model = GaussianHMM(3, topology="ergodic").fit(sequences)
+    distances = np.linalg.norm(model.means_[:, None] - places[None], axis=2)
+    assert (distances.min(axis=1) < 0.05).all()
+    assert sorted(distances.argmin(axis=1).tolist()) == [0, 1, 2]

@@ -10,6 +10,7 @@ import pytest
 
 from paramove.hmm import resample
 from paramove.phmm import (
+    ExtrapolationWarning,
     InterpolativePHMM,
     LinearPHMM,
     MovementClassifier,
@@ -102,3 +103,18 @@ def test_without_the_range_of_the_training_nothing_is_unusual(
     bare = ParametricHMM.load(tmp_path / "bare.npz")
     assert bare.training_range_ is None
     assert bare.remarks(UNSEEN[:40]) == ()
+
+
+def test_theta_far_outside_the_training_warns() -> None:
+    rng = np.random.default_rng(0)
+    theta = np.repeat(np.linspace(0.0, 1.0, 3), 3)[:, None]
+    sequences = [
+        np.linspace(0, 1, 60)[:, None] * (one + np.array([1.0, 2.0, 3.0])) + rng.normal(0, 0.01, (60, 3))
+        for one in theta
+    ]
+    model = LinearPHMM(5).fit(sequences, theta)
+    for inside in (-1.0, 0.0, 0.5, 2.0):
+        model.synthesize([inside], 10)
+    for outside in (-1.1, 2.1, 70.0):
+        with pytest.warns(ExtrapolationWarning, match="component 1"):
+            model.synthesize([outside], 10)

@@ -169,15 +169,28 @@ def warp(first: ArrayLike, second: ArrayLike, pattern: StepPattern = "A") -> Ali
     return Alignment(path[:, 0], path[:, 1], float(total[-1, -1]))
 
 
-def movement_distance(first: ArrayLike, second: ArrayLike, *, n_points: int = 7, cut: float = 0.15) -> float:
+def movement_distance(first: ArrayLike, second: ArrayLike, *, n_points: int | None = None, cut: float = 0.15) -> float:
     """Root mean square distance of body points after warping, without the fraction `cut` at both ends (4.3), in m.
 
     Corrected: divided by the actual number of terms.
+
+    Args:
+        first, second: stacked positions of body points, each (T, D).
+        n_points: number of body points; None: of three coordinates each.
+        cut: fraction of the alignment that is left out at each end.
+
+    Raises ValueError for frames that are not of so many points.
     """
     p, q = checked_sequence(first), checked_sequence(second)
+    count = n_points if n_points is not None else p.shape[1] // 3
+    if count < 1 or p.shape[1] % count or (n_points is None and p.shape[1] % 3):
+        raise ValueError(
+            f"frames of {p.shape[1]} numbers are not positions of {n_points or 'whole'} points; give n_points that "
+            "divides them"
+        )
     alignment = warp(p, q)
     length = len(alignment.first)
     middle = slice(int(np.floor(cut * length)), int(np.ceil((1.0 - cut) * length)))
     difference = p[alignment.first[middle]] - q[alignment.second[middle]]
-    squared = (difference.reshape(len(difference), n_points, -1) ** 2).sum(axis=2)
+    squared = (difference.reshape(len(difference), count, -1) ** 2).sum(axis=2)
     return float(np.sqrt(squared.mean()))

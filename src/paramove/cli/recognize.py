@@ -120,7 +120,11 @@ def _lines(facts: dict[str, Any], recognition: Recognition) -> list[tuple[str, s
     if recognition.outside:
         rows.append(("beware", f"{', '.join(recognition.outside)} outside what the model was trained with"))
     rows += [("beware", remark) for remark in recognition.remarks]
-    p_value = "this model has none" if recognition.p_value is None else percent(recognition.p_value)
+    p_value = (
+        "unknown: of this model, or of a single demonstration, there is none"
+        if recognition.p_value is None
+        else percent(recognition.p_value)
+    )
     rows += [("p-value", p_value), ("log-likelihood", f"{facts['log_likelihood']:.1f}")]
     if "labelled_action" in facts:
         rows.append(("labelled", facts["labelled_action"]))

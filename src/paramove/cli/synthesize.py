@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -46,6 +47,7 @@ def synthesize(
     """
     import numpy as np
 
+    from paramove.phmm import ExtrapolationWarning
     from paramove.training import ENDINGS, Made, as_csv, write_movement
 
     if out is not None and out.suffix not in ENDINGS:
@@ -57,7 +59,9 @@ def synthesize(
         about = trained.description
         seconds = duration or (about.duration if about else 0.0) or SECONDS
         count = frames or max(2, round(seconds * ((about.rate_hz if about else 0.0) or RATE_HZ)) + 1)
-        made = Made.by(trained, values, np.linspace(0.0, seconds, count))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ExtrapolationWarning)  # `_check` has warned
+            made = Made.by(trained, values, np.linspace(0.0, seconds, count))
         if out is not None:
             out.parent.mkdir(parents=True, exist_ok=True)
             write_movement(made, out)

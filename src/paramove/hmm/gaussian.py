@@ -1,6 +1,6 @@
 """The plain HMM with one Gaussian per state: ergodic or left-right, with or without finish state (thesis 2.1, 2.2).
 
-Baum-Welch begins with equal parts of each sequence, or with drawn parameters.
+Baum-Welch begins with equal parts of each sequence, of an ergodic chain with clusters, or with drawn parameters.
 """
 
 from collections.abc import Sequence
@@ -38,6 +38,8 @@ from paramove.hmm.sequences import (
 from paramove.hmm.training import iterate, segment_outputs
 
 Initialisation = Literal["segments", "random"]
+CLUSTER_STARTS = 10
+"""k-means depends on where it starts; the clusters with the smallest spread are taken."""
 
 
 def initial_chain(
@@ -49,9 +51,12 @@ def initial_chain(
     initialisation: Initialisation,
     seed: int,
 ) -> ChainParameters:
-    """First parameters. "segments" cuts each sequence into N equal parts and lets each state last as long as its part;
-    "random" draws the cuts of each sequence and all probabilities that the topology leaves open.
-    """  # fmt: skip
+    """First parameters.
+
+    "segments" cuts each sequence into N equal parts and lets each state last as long as its part; an ergodic chain,
+    whose states may return, takes N clusters of frames instead. "random" draws the cuts of each sequence and all
+    probabilities that the topology leaves open.
+    """
     # A sequence with fewer frames than states is stretched, for each state needs a frame to begin with.
     stretched = [one if len(one) >= n_states else resample(one, n_states) for one in sequences]
     mean_length = float(np.mean([len(sequence) for sequence in sequences]))
@@ -63,6 +68,8 @@ def initial_chain(
         starts, exits, allowed = (rng.exponential(size=one.shape) * one for one in (starts, exits, allowed))
     else:
         labels = [np.arange(len(sequence)) * n_states // len(sequence) for sequence in stretched]
+        if topology.name == "ergodic":
+            labels = _clusters(stretched, labels, n_states, seed)
         if topology.self_transitions:
             leaving = allowed.sum(axis=1) - 1.0 + exits
             stay = max(mean_length / n_states - 1.0, 0.5)  # a_ii / (1 - a_ii) of the expected duration
@@ -71,6 +78,30 @@ def initial_chain(
     total = allowed.sum(axis=1) + exits
     total[total == 0] = 1.0
     return ChainParameters(starts / starts.sum(), allowed / total[:, None], exits / total, means, covariances)
+
+
+def _clusters(sequences: Sequence[Floats], parts: list[Ints], n_states: int, seed: int) -> list[Ints]:
+    """The cluster of each frame (k-means++, in units of the coordinates' deviations); `parts` where one stays empty."""
+    from scipy.cluster.vq import ClusterError, kmeans2  # a tenth of a second, for ergodic chains only
+
+    frames = np.concatenate(list(sequences))
+    scaled = (frames - frames.mean(axis=0)) / np.maximum(frames.std(axis=0), 1e-12)
+    best: Ints | None = None
+    smallest = np.inf
+    for start in range(CLUSTER_STARTS):
+        try:
+            centres, numbers = kmeans2(
+                scaled, n_states, minit="++", missing="raise", rng=np.random.default_rng(seed + start)
+            )
+        except ClusterError:
+            continue
+        spread = float(((scaled - centres[numbers]) ** 2).sum())
+        if len(np.unique(numbers)) == n_states and spread < smallest:
+            best = np.asarray(numbers, dtype=np.int64)
+            smallest = spread
+    if best is None:
+        return parts
+    return np.split(best, np.cumsum([len(sequence) for sequence in sequences])[:-1])
 
 
 def _drawn_labels(n_frames: int, n_states: int, rng: np.random.Generator) -> Ints:
@@ -88,8 +119,9 @@ class GaussianHMM:
         self_transitions: False for left-right paths that leave a state with each frame (figure 2.3).
         finish_state: whether each path ends in the finish state N + 1 (2.2.3.1).
         covariance: "full", "diagonal" or "tied" (one for all states).
-        initialisation: "segments" cuts each sequence into N equal parts; "random" draws the cuts with `seed`.
-        seed: of "random".
+        initialisation: "segments" cuts each sequence into N equal parts, or of an ergodic chain takes N clusters of all
+            frames; "random" draws the cuts.
+        seed: of what is drawn.
         options: of the training.
 
     Attributes:

@@ -13,6 +13,7 @@ from .network.model import NeuralPHMM as NeuralPHMM
 from .parametric import ParametricHMM as ParametricHMM
 from .parametric import has_p_values as has_p_values
 from .performance import groups_of as groups_of
+from .plausibility import ExtrapolationWarning as ExtrapolationWarning
 from .plausibility import UnlikelyMovementWarning as UnlikelyMovementWarning
 from .polynomial import CubicPHMM as CubicPHMM
 from .polynomial import LinearPHMM as LinearPHMM

@@ -219,11 +219,12 @@ def _result(model: ParametricHMM, sequence: Floats, finished: bool) -> tuple[Par
     recorded = checked_sequence(sequence, model.covariances_.shape[-1])
     if has_p_values(model):
         examination = model._expecting_noise_of(recorded)._examined(recorded, finished)
-        return examination.estimate, examination.log_p_value, examination.p_value
+        score = 0.0 if np.isnan(examination.log_p_value) else examination.log_p_value
+        return examination.estimate, score, examination.p_value
     estimate = model._estimate(recorded, finished)
     # Neighbouring frames are redundant: the frames of a state count as one.
     frames = model.resampled_frames_ or len(sequence)
-    return estimate, estimate.log_likelihood * model.n_states / frames, 1.0
+    return estimate, estimate.log_likelihood * model.n_states / frames, float("nan")
 
 
 def _are_names(value: object) -> TypeGuard[tuple[str, ...]]:

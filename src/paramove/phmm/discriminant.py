@@ -100,7 +100,7 @@ class Discriminant:
         return result
 
     def p_value(self, sequence: Floats, action: int) -> float:
-        """Probability that a genuine movement of the action lies at least as far from its mean."""
+        """Probability that a genuine movement of the action lies at least as far from its mean; NaN if unknown."""
         return float(
             np.exp(self.usual[action].log_above(float(np.log(self._distances_of(sequence)[0, action] + 1e-9))))
         )

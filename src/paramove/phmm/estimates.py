@@ -25,7 +25,7 @@ class Examination(NamedTuple):
         outlier_score: distance from the training movements, see `Performances.outlier_score`; of a beginning the
             root of its distance in units of the median one.
         log_density: of `movement_parts`, or of the points of a beginning.
-        log_p_value: logarithm of `p_value`.
+        log_p_value: logarithm of `p_value`; NaN, unknown, if there were too few training movements.
     """
 
     estimate: ParameterEstimate
@@ -35,7 +35,10 @@ class Examination(NamedTuple):
 
     @property
     def p_value(self) -> float:
-        """Probability that a genuine movement has at least this outlier score; a small one is a reason to reject."""
+        """Probability that a genuine movement has at least this outlier score; a small one is a reason to reject.
+
+        NaN, unknown, if there were too few training movements.
+        """
         return float(np.exp(self.log_p_value))
 
 

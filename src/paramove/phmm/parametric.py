@@ -45,7 +45,12 @@ from paramove.phmm.estimates import Examination, ParameterEstimate
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, NoiseLevel
 from paramove.phmm.performance import Performances, groups_of, movement_parts, state_averages
-from paramove.phmm.plausibility import TrainingRange, UnlikelyMovementWarning
+from paramove.phmm.plausibility import (
+    ExtrapolationWarning,
+    TrainingRange,
+    UnlikelyMovementWarning,
+    far_outside,
+)
 from paramove.phmm.ridge import smoothed
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_numbers, read_record, write_record
 
@@ -284,13 +289,28 @@ class ParametricHMM(ABC):
         """The prototype movement for theta (thesis 4.1.2.2), by number of samples or by duration in s. Shape (n, D).
 
         path "linear" interpolates the means as the thesis does; "smooth" does not cut corners, see
-        `paramove.hmm.synthesis.prototype`.
+        `paramove.hmm.synthesis.prototype`. Warns (`ExtrapolationWarning`) of theta far outside the training.
         """
         if duration is not None:
             if n_samples is not None:
                 raise ValueError("give n_samples or duration, not both")
             n_samples = max(2, round(duration * sample_rate) + 1)
-        return self.at(theta).synthesize(n_samples, timing, path)
+        model = self.at(theta)
+        self._warn_of_extrapolation(theta)
+        return model.synthesize(n_samples, timing, path)
+
+    def _warn_of_extrapolation(self, theta: ArrayLike) -> None:
+        if self.parameter_bounds_ is None:
+            return
+        values = np.ravel(np.asarray(theta, dtype=np.float64))
+        for index in far_outside(values, self.parameter_bounds_):
+            low, high = self.parameter_bounds_[:, index]
+            warnings.warn(
+                f"component {index + 1} of theta is {values[index]:.4g}, in the training {low:.4g} to {high:.4g}: the "
+                "movement is extrapolated far beyond what was demonstrated",
+                ExtrapolationWarning,
+                stacklevel=3,
+            )
 
     def synthesize_through(self, theta: ArrayLike, via: Mapping[float, ArrayLike], n_samples: int) -> Floats:
         """The most likely movement for theta (P,) that passes given poses. Shape (n_samples, D).

@@ -136,8 +136,8 @@ class Performances:
     def log_p_value(self, outlier_score: float) -> float:
         """Logarithm of the p-value: the probability that a genuine movement has at least this outlier score.
 
-        The logarithms of the scores of left-out training movements are assumed normally distributed, with a different
-        mean in each group.
+        NaN, unknown, for a single training movement. The logarithms of the scores of left-out training movements are
+        assumed normally distributed, with a different mean in each group.
         """
         return self._usual.log_above(float(np.log(outlier_score + 1e-9)))
 

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from paramove.documents import Floats
+from paramove.documents import Floats, Ints
 from paramove.phmm.performance import part_means
 
 OTHER_UNIT = 50.0
@@ -21,6 +21,19 @@ PARTS, PART_FRAMES = 10, 10
 
 class UnlikelyMovementWarning(UserWarning):
     """A sequence is hardly a complete movement at the frame rate of the training: its estimate means little."""
+
+
+class ExtrapolationWarning(UserWarning):
+    """Theta lies farther outside the training than the training is wide: what is synthesised means little."""
+
+
+def far_outside(theta: Floats, bounds: Floats) -> Ints:
+    """Components of theta (P,) that lie farther outside the bounds (2, P) than these are apart. Their indices."""
+    low, high = bounds
+    width = high - low
+    slack = 1e-9 * np.maximum(np.abs(low), np.abs(high))
+    far = (theta < low - width - slack) | (theta > high + width + slack)
+    return np.flatnonzero(far).astype(np.int64)
 
 
 @dataclass(frozen=True)

@@ -56,9 +56,9 @@ class PredictiveDistribution:
         return cls(float(means.mean()), float(np.sqrt(variance)), min(freedom, len(values) - 1.0))
 
     def log_above(self, value: float) -> float:
-        """Logarithm of the probability of a larger value, finite; 0 for too few values."""
+        """Logarithm of the probability of a larger value, finite; NaN, unknown, for too few values."""
         if not np.isfinite(self.deviation):
-            return 0.0
+            return float("nan")
         return log_upper_tail((value - self.mean) / self.deviation, self.freedom)
 
 

@@ -57,7 +57,7 @@ class WindowEstimate:
     @property
     def likeness(self) -> float:
         """From 0 (no pointing) to 1 (typical pointing)."""
-        return float(self.examination.p_value**0.25) if self.pointing else 0.0
+        return float(np.nan_to_num(self.examination.p_value) ** 0.25) if self.pointing else 0.0
 
 
 class PointingWindow:

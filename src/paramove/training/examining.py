@@ -40,7 +40,8 @@ class Recognition:
         posterior: probability of each action.
         estimate: of the action's parameters.
         parameter_names: of the components of theta.
-        p_value: probability that a genuine movement has at least this outlier score; None from models without p-values.
+        p_value: probability that a genuine movement has at least this outlier score; None if it is unknown: from models
+            without p-values, or with a single training movement.
         outside: names of the parameters whose estimates are outside the bounds of the training.
         remarks: what makes it hardly a movement, or a beginning, at the frame rate of the training.
         labelled: theta of the label, as far as the model has its parameters; None without a label.
@@ -171,10 +172,14 @@ class Examiner:
             if not has_p_values(model):
                 return action, {action: 1.0}, model.estimate(movement.frames, finished=False), None
             examination = model.examine(movement.frames, finished=False)
-            return action, {action: 1.0}, examination.estimate, examination.p_value
+            return action, {action: 1.0}, examination.estimate, _known(examination.p_value)
         result = self.classifier.classify(movement.frames, finished=finished)
-        p_value = result.p_value if has_p_values(self.models[result.action]) else None
-        return result.action, result.posterior, result.estimates[result.action], p_value
+        return result.action, result.posterior, result.estimates[result.action], _known(result.p_value)
+
+
+def _known(p_value: float) -> float | None:
+    """The p-value; None for NaN, which is unknown."""
+    return None if np.isnan(p_value) else p_value
 
 
 def _scored_by(model: ParametricHMM) -> tuple[object, ...]:

@@ -15,7 +15,7 @@ from scipy.spatial import Delaunay, QhullError
 from paramove.alignment import movement_distance
 from paramove.documents import Floats
 from paramove.hmm import resample
-from paramove.phmm import InterpolativePHMM, ParametricHMM, UnlikelyMovementWarning, groups_of
+from paramove.phmm import ExtrapolationWarning, InterpolativePHMM, ParametricHMM, UnlikelyMovementWarning, groups_of
 from paramove.training.examples import Examples, is_place
 from paramove.training.plots import levels_of
 
@@ -173,5 +173,7 @@ def is_outside(theta: Floats, trained: Floats) -> bool:
 
 def synthesis_error(model: ParametricHMM, theta: Floats, sequence: Floats, n_points: int) -> float:
     """Root mean square distance of body points between the synthesis for theta and a recording (T, D), warped."""
-    synthesised = model.synthesize(theta, FRAMES)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ExtrapolationWarning)  # `outside` says so
+        synthesised = model.synthesize(theta, FRAMES)
     return movement_distance(synthesised, resample(sequence, FRAMES), n_points=n_points, cut=0.0)
