@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import ast
+import contextlib
+import os
+import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 import zmq
 
@@ -55,6 +59,26 @@ def test_a_child_made_by_fork_is_told_at_its_first_use_and_the_parent_goes_on(fo
     assert all("the bus of recognizer was made in process" in line for line in child)
     assert all("make a Bus in the new process, under another name" in line for line in child)
     assert parent == "parent said 1"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_forked_children_of_a_node_end_by_signals_and_with_it(folder: Path, number: signal.Signals) -> None:
+    config = folder / "pool.yaml"
+    config.write_text(f"node: pool\nbus: {{folder: {folder}}}\n", encoding="utf-8")
+    command = [sys.executable, "-W", "ignore", "-m", "tests.bus.pool_node", "--config", str(config)]
+    with Bus("tester", BusSettings(folder=folder), (topics.SPEECH, topics.status("pool"))) as bus:
+        node = subprocess.Popen(command, cwd=Path(__file__).parents[2], start_new_session=True)
+        try:
+            first, *children = map(int, next(bus.events(topics.SPEECH)).message.text.split())
+            os.kill(first, number)  # one of the pool: it ends, and nothing else
+            assert next(bus.events(topics.SPEECH)).message.text
+            node.send_signal(number)
+            assert node.wait(20) == 0
+            assert not [child for child in children if psutil.pid_exists(child)]
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(node.pid, signal.SIGKILL)
+            node.wait()
 
 
 WALL_CLOCK = {"time.time", "time.time_ns", "time.localtime", "time.gmtime", "datetime.now", "datetime.utcnow"}

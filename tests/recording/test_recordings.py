@@ -100,8 +100,17 @@ def test_other_programs_can_read_it(tmp_path: Path) -> None:
             known = {one.name for one in files}
             assert all(needed in known for one in files for needed in one.dependency)
             assert schema.name.rpartition(".")[2] in {message.name for one in files for message in one.message_type}
-        notes = [(one.name, one.metadata) for one in reader.iter_metadata() if one.name != CHANNELS]
+        notes = [(one.name, one.metadata) for one in reader.iter_metadata() if not one.name.startswith(CHANNELS)]
         assert notes == [("run", {"seed": "7"})]
+
+
+def test_no_metadata_repeats_a_name_or_a_key(tmp_path: Path) -> None:
+    recordings.write(tmp_path / "run.mcap", 20)
+    with (tmp_path / "run.mcap").open("rb") as file:
+        notes = list(make_reader(file).iter_metadata())
+    names, keys = [note.name for note in notes], [key for note in notes for key in note.metadata]
+    assert sorted(set(names)) == sorted(names)
+    assert sorted(keys) == ["gestures", "speech"]
 
 
 def test_a_recording_is_never_written_over_another(tmp_path: Path) -> None:

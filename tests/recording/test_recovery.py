@@ -7,6 +7,7 @@ import signal
 import struct
 import subprocess
 import sys
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,7 +18,7 @@ from mcap.reader import make_reader
 from paramove.recording.damage import Sound, survey
 from paramove.recording.reader import read
 from paramove.recording.recovery import RecoveryError, StillWrittenError, recover, recovered_path
-from paramove.recording.writer import CHUNK_BYTES, RecordingExistsError, RecordingWriter
+from paramove.recording.writer import CHANNELS, CHUNK_BYTES, RecordingExistsError, RecordingWriter
 from tests.recording import recordings
 
 ROOT = Path(__file__).parents[2]
@@ -130,9 +131,18 @@ def test_flipped_bytes_cost_the_chunks_they_are_in(tmp_path: Path) -> None:
             assert is_whole(result.destination)
 
 
-def test_the_chunk_that_names_the_topics_is_lost(tmp_path: Path) -> None:
+def _as_in_the_last_release(recording: RecordingWriter, topic: str) -> None:
+    recording.note(CHANNELS, {name: str(number) for name, number in recording._channels.items()})
+
+
+@pytest.mark.parametrize("form", [None, _as_in_the_last_release])
+def test_the_chunk_that_names_the_topics_is_lost(
+    tmp_path: Path, form: Callable[[RecordingWriter, str], None] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Topics are told again outside it, and their types are in the topic table."""
-    content, written, chunks = finished()
+    if form is not None:
+        monkeypatch.setattr(RecordingWriter, "_note_channel", form)
+    content, written, chunks = finished.__wrapped__()
     begin, end, _ = chunks[0]
     middle = (begin + end) // 2
     damaged = content[:middle] + bytes(8) + content[middle + 8 : chunks[-1][1]]

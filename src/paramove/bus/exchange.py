@@ -254,7 +254,7 @@ class Exchange:
     def stop(self) -> None:
         """Makes `wait` return at once and for good. May be called from a signal handler."""
         self.stopped = True
-        if not self._closed:
+        if not self._closed and os.getpid() == self._pid:  # a fork shares the descriptor with its parent
             with contextlib.suppress(OSError):  # another thread is closing it just now
                 os.eventfd_write(self._wake, 1)
 

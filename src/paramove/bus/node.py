@@ -17,7 +17,6 @@ from __future__ import annotations
 import argparse
 import logging
 import os
-import signal
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -29,6 +28,7 @@ from paramove.bus.bus import Bus
 from paramove.bus.endpoint import BusFolderError, TopicTakenError
 from paramove.bus.log_format import log_to_stderr
 from paramove.bus.settings import BusSettings
+from paramove.bus.signals import handle_signals
 from paramove.bus.topics import Topic
 from paramove.documents import InputError, OldNames, exit_codes, findings, read_document
 
@@ -134,8 +134,7 @@ def main(
 
 def _run(run: Callable[[Bus, Config], None], bus: Bus, config: Config, visitor: bool) -> int:
     """Calls `run` with the signals tied to the bus; returns the exit code."""
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: bus.stop())
+    handle_signals(bus.stop)
     try:
         bus.starting("starting")
         bus.connect(visitor=visitor)

@@ -119,10 +119,10 @@ class Survey:
             self.schemas[record.id] = record if checked else self.schemas.get(record.id, record)
         elif isinstance(record, Statistics):
             self.statistics = record
-        elif isinstance(record, Metadata) and record.name != CHANNELS:
-            self.notes.append(record)
+        elif isinstance(record, Metadata) and f"{record.name}.".startswith(f"{CHANNELS}."):
+            self._take_channels(record)  # of the present form, or of the last release's, whose names repeat
         elif isinstance(record, Metadata):
-            self._take_channels(record)
+            self.notes.append(record)
 
     def _take_channels(self, record: Metadata) -> None:
         """Channels whose own records are lost; the topic table has their types."""

@@ -22,7 +22,8 @@ from mcap.writer import CompressionType, Writer
 from paramove.documents import rename_durably
 
 CHANNELS = "paramove.channels"
-"""Metadata that repeats which channel is which topic: otherwise losing the chunk with that record loses all."""
+"""Metadata that says again which channel is which topic: otherwise losing the chunk with that record loses all. One
+record for each channel, with its number behind a dot: readers such as rerun expect names and keys that are unique."""
 CHUNK_BYTES = 64 * 1024
 CHUNK_NS = 250_000_000
 """Of publication time; damage to a longer chunk would cost more."""
@@ -162,8 +163,12 @@ class RecordingWriter:
             self._channels[topic] = self._writer.register_channel(
                 topic=topic, message_encoding=message_encoding, schema_id=self._schemas[schema]
             )
-            self.note(CHANNELS, {name: str(number) for name, number in self._channels.items()})
+            self._note_channel(topic)
         return self._channels[topic]
+
+    def _note_channel(self, topic: str) -> None:
+        number = self._channels[topic]
+        self.note(f"{CHANNELS}.{number}", {topic: str(number)})
 
 
 class _Stream:

@@ -1,0 +1,41 @@
+"""A node that tests start as a process: computes in a pool of forked processes until it is to end."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, main
+from paramove.msgs.rule_pb2 import Speech
+
+SUBSCRIBES = ()
+PUBLISHES = (topics.SPEECH,)
+
+
+def _work(number: int) -> int:
+    return os.getpid()
+
+
+def _wait(number: int) -> None:
+    signal.pause()
+
+
+def run(bus: Bus, config: NodeConfig) -> None:
+    """Publishes the processes of the pool once a tick."""
+    with multiprocessing.get_context("fork").Pool(3) as pool:
+        pids = sorted({pid for _ in range(20) for pid in pool.map(_work, range(30), chunksize=1)})
+        pool.map_async(_wait, range(2))
+        child = os.fork()  # without a pool
+        if child == 0:
+            signal.pause()
+        bus.ready("computes")
+        for _ in bus.events(tick=True):
+            bus.publish(topics.SPEECH, Speech(text=" ".join(map(str, (*pids, child)))))
+        os.kill(child, signal.SIGTERM)
+        os.waitpid(child, 0)
+
+
+if __name__ == "__main__":
+    main(run, SUBSCRIBES, PUBLISHES, NodeConfig)
