@@ -57,7 +57,8 @@ def api_page() -> str:
                 file = Path(inspect.getfile(importlib.import_module(thing.__module__))).relative_to(ROOT)
                 link = f"[{link}](../../{file})"
             described = ours or inspect.ismodule(thing)
-            detail = first_sentence(thing) if described else f"`{inspect.formatannotation(thing):.120}`"
+            value = re.sub(r" at 0x[0-9a-f]+", "", inspect.formatannotation(thing))  # another one in each process
+            detail = first_sentence(thing) if described else f"`{value:.120}`"
             parts.append(f"| {link} | {detail.replace('|', '&#124;')} |\n")
     return "".join(parts)
 

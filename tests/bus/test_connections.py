@@ -17,7 +17,7 @@ from paramove.bus import topics
 from paramove.bus.barrier import LockstepBarrier
 from paramove.bus.bus import Bus
 from paramove.bus.envelope import Envelope, pack
-from paramove.bus.lockstep import SERVICE
+from paramove.bus.lockstep import SERVICE, from_marks, member_mark
 from paramove.bus.publisher import Publisher
 from paramove.bus.schemas import schema_hash
 from paramove.bus.settings import BusSettings
@@ -126,20 +126,28 @@ def test_strangers_at_the_lockstep_socket_are_refused(folder: Path, caplog: pyte
         barrier = LockstepBarrier(bus)
         stranger: zmq.Socket[Any] = bus.exchange.context.socket(zmq.DEALER)
         stranger.connect(f"ipc://{folder / SERVICE}")
-        answer = TickDone(node="ghost", pid=2**22 + 1, kind=TickDone.KIND_JOIN).SerializeToString()
         envelope = Envelope(schema_hash(TickDone), 0, 0, 0, 0, 0)
+
+        def join(pid: int, marked: bool) -> None:
+            """Greets as a member whose process does not exist."""
+            marks = {member_mark("ghost"): (pid, 0)} if marked else {}
+            answer = TickDone(node="ghost", pid=pid, kind=TickDone.KIND_JOIN, published=from_marks(marks))
+            payload = answer.SerializeToString()
+            stranger.send_multipart([pack(envelope, payload), payload])
+
+        join(2**22 + 1, True)
+        join(2**32 - 1, True)
+        join(os.getpid(), False)
         stranger.send_multipart([b"nonsense"])
         stranger.send_multipart([b"x" * 56, b""])
         stranger.send_multipart([pack(envelope, b"\xff"), b"\xff"])
-        for _ in range(7):
+        for _ in range(4):
             stranger.send_multipart([b"nonsense"])
-        stranger.send_multipart([pack(envelope, answer), answer])
-        while "cannot join" not in caplog.text:
+        while barrier.rejected < 10:
             bus.exchange.wait(0.1)
             barrier._read_answers()
         assert barrier.advance(1) == []
         stranger.close(linger=0)
     assert (barrier.rejected, barrier.members) == (10, frozenset())
-    assert "lockstep: answer rejected (number 1): 2 frames, expected 3: sender, header, answer" in caplog.text
-    assert "lockstep: answer rejected (number 10)" in caplog.text
-    assert "ghost cannot join as process 4194305" in caplog.text
+    assert "lockstep: answer rejected (number 1): 'ghost' cannot join as process 4194305" in caplog.text
+    assert "lockstep: answer rejected (number 10): 2 frames, expected 3: sender, header, answer" in caplog.text

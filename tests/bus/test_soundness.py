@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 
 from paramove.bus import topics
 from paramove.bus.envelope import Reason
-from paramove.bus.publisher import Publisher
+from paramove.bus.publisher import ImpossibleTimeError, Publisher
 from paramove.bus.soundness import LARGEST, unsound
 from paramove.bus.subscriber import Subscriber
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint
+from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal
 from tests.bus.conftest import Wait
 
@@ -57,6 +58,29 @@ def test_times_that_no_clock_has_are_found(seconds: int, nanos: int) -> None:
     gesture = Gesture()
     gesture.captured.seconds, gesture.captured.nanos = seconds, nanos
     assert unsound(gesture) == f"captured.seconds is {seconds} with {nanos} ns"
+
+
+def test_a_value_without_a_name_is_unsound() -> None:
+    status = NodeStatus()
+    status.state = 99  # type: ignore[assignment]
+    assert unsound(NodeStatus.FromString(status.SerializeToString())) == "state is 99, which has no name"
+
+
+def test_an_impossible_time_is_rejected_at_the_publisher(context: zmq.Context[Any], folder: Path, wait: Wait) -> None:
+    publisher = Publisher(context, folder, topics.ARM_TRAJECTORY, "synthesizer")
+    subscriber = Subscriber(context, folder, topics.ARM_TRAJECTORY)
+    wait(lambda: subscriber.receive() or subscriber.welcomed, publisher.serve)
+    trajectory = JointTrajectory()
+    for seconds in (-(2**63), -1, 2**62):
+        trajectory.captured.seconds = seconds
+        with pytest.raises(ImpossibleTimeError, match=f"captured.seconds is {seconds}"):
+            publisher.publish(trajectory, captured_ns=1, now_ns=2)
+    for time_ns in (-(2**63), 2**63, 10**20):
+        with pytest.raises(ImpossibleTimeError, match=str(time_ns)):
+            publisher.publish(JointTrajectory(), captured_ns=time_ns, now_ns=2)
+    publisher.publish(JointTrajectory(id="good"), captured_ns=1, now_ns=2)
+    received = wait(subscriber.receive)
+    assert (received.message.id, received.sequence) == ("good", 1)
 
 
 @settings(deadline=None, max_examples=100, derandomize=True)

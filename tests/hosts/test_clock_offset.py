@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
+import random
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paramove.hosts.clock_offset import MOST_DRIFT, REFERENCE_NS, ClockOffset
+from paramove.hosts.clock_offset import MOST_DRIFT, MOST_SLEW, REFERENCE_NS, ClockOffset
 
 MS = 1_000_000
 delays_ns = st.integers(0, 300 * MS)
@@ -49,6 +50,49 @@ def test_the_truth_lies_within_the_bound(offset_ns, drift, rounds, later_ns):
         assert abs(found - drift) <= bound + 1e-9
 
 
+class SlewedClock:
+    """A clock whose rate NTP changes every few seconds, in either direction."""
+
+    def __init__(self, begin_ns, rates, seconds_each):
+        self._rates = rates
+        self._each_ns = round(1e9 * seconds_each)
+        self._begin_ns = begin_ns
+
+    def at(self, true_ns):
+        """Its time at a time of no clock's."""
+        time_ns, left_ns = self._begin_ns, true_ns
+        rates = itertools.cycle(self._rates)
+        while left_ns:
+            lasts_ns = min(left_ns, self._each_ns)
+            time_ns += lasts_ns + round(next(rates) * lasts_ns)
+            left_ns -= lasts_ns
+        return time_ns
+
+
+slews = st.lists(st.sampled_from([-MOST_SLEW, 0.0, MOST_SLEW]), min_size=1, max_size=6)
+
+
+@settings(deadline=None, derandomize=True)
+@given(slews, slews, st.floats(0.3, 30.0), st.integers(0, 10**17), st.integers(20_000, 20 * MS), st.integers(0, 99))
+def test_the_truth_lies_within_the_bound_while_ntp_slews_both_clocks(here, there, seconds_each, ahead_ns, way_ns, seed):
+    draw = random.Random(seed)
+    own, other = SlewedClock(10**15, here, seconds_each), SlewedClock(10**15 + ahead_ns, there, 0.7 * seconds_each)
+    clock = ClockOffset()
+    true_ns = 0
+    for _ in range(60):
+        true_ns += draw.randrange(1000 * MS)
+        sent_ns = own.at(true_ns)
+        true_ns += draw.randrange(1, way_ns)
+        there_ns = other.at(true_ns)
+        true_ns += draw.randrange(1, way_ns)
+        clock.add(sent_ns, there_ns, own.at(true_ns))
+        for later_ns in (0, draw.randrange(1000 * MS)):
+            now_ns = own.at(true_ns + later_ns)
+            truth_ns = other.at(true_ns + later_ns) - now_ns
+            assert abs(clock.offset_ns(now_ns) - truth_ns) <= clock.bound_ns(now_ns)
+    assert clock.jumps == 0
+
+
 def test_nothing_is_known_before_the_first_reply():
     clock = ClockOffset()
     assert clock.bound_ns(5) == math.inf
@@ -60,7 +104,7 @@ def test_one_quick_round_trip_makes_up_for_many_slow_ones():
     now_ns = exchange(clock, 7 * MS, 0.0, [(10 * MS, 90 * MS, 10 * MS)] * 20 + [(10 * MS, MS, MS)])
     assert clock.bound_ns(now_ns) <= 1.01 * MS
     now_ns = exchange(clock, 7 * MS, 0.0, [(10 * MS, 90 * MS, 10 * MS)] * 20, now_ns)
-    assert clock.bound_ns(now_ns) <= 1.5 * MS  # it may have drifted since
+    assert clock.bound_ns(now_ns) <= 4 * MS  # it may have drifted since
 
 
 def test_the_drift_shows_after_a_while():
@@ -74,5 +118,7 @@ def test_the_drift_shows_after_a_while():
 def test_a_clock_that_jumps_is_estimated_anew():
     clock = ClockOffset()
     now_ns = exchange(clock, 0, 0.0, [(10 * MS, MS, MS)] * 10)
+    assert clock.jumps == 0
     now_ns = exchange(clock, 900 * MS, 0.0, [(10 * MS, MS, MS)] * 2, now_ns)
     assert abs(clock.offset_ns(now_ns) - 900 * MS) <= clock.bound_ns(now_ns) < 2 * MS
+    assert clock.jumps == 1

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import selectors
 import socket
-import struct
 import time
 
 import numpy as np
 import pytest
+import zmq
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from paramove.bus import topics
+from paramove.bus import LATEST_NS, Envelope, pack, schema_hash, topics
 from paramove.hosts import HostKeyError, HostKeys, link
+from paramove.hosts.link import Gatekeeper
+from paramove.msgs.clock_pb2 import TickDone
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.rule_pb2 import Rule, Rules, Speech
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
@@ -131,7 +134,7 @@ def test_what_a_trusted_host_may_not_give_is_rejected_and_counted(two_hosts):
     offer = here._offers[0]
     hosts.until(lambda: offer.askers)
     for asker in offer.askers.values():
-        offer.send(asker, b"M", b"arm/trajectory\0" + bytes(56), b"anything")
+        offer.send(asker, link.Content(topic="arm/trajectory"), bytes(56), b"anything")
     hosts.until(lambda: "1 rejected" in hosts.relays["there"].detail)
     assert not moves.welcomed
 
@@ -195,11 +198,10 @@ def clock_ahead(monkeypatch):
     """The clock of the relay that offers is 100 s ahead."""
     sent = link.Offer.send
 
-    def send(self, asker, *frames):
-        if frames[0] == link.BEAT:
-            (time_ns,) = struct.unpack("<q", frames[2])
-            frames = (*frames[:2], struct.pack("<q", time_ns + 100_000_000_000))
-        return sent(self, asker, *frames)
+    def send(self, asker, message, *behind):
+        if isinstance(message, link.Beat):
+            message = message.model_copy(update={"there_ns": message.there_ns + 100_000_000_000})
+        return sent(self, asker, message, *behind)
 
     monkeypatch.setattr(link.Offer, "send", send)
 
@@ -367,3 +369,144 @@ def test_packets_that_are_sent_again_are_worth_nothing(two_hosts):
     hosts.until(lambda: received == ["move", "again"], serve)
     proxy.close()
     images.close()
+
+
+class OtherHost:
+    """A trusted host in other hands: raw sockets with its key, in place of its relay."""
+
+    def __init__(self, hosts):
+        self.hosts = hosts
+        own = hosts.keys["there"].own()
+        self.context = zmq.Context()
+        self.gate = Gatekeeper(self.context, {"here": hosts.keys["here"].own().public})
+        self.offer = self.context.socket(zmq.ROUTER)
+        self.offer.setsockopt(zmq.CURVE_SERVER, 1)
+        self.offer.setsockopt_string(zmq.CURVE_SECRETKEY, own.secret)
+        self.offer.bind(f"tcp://127.0.0.1:{hosts.ports['there']}")
+        self.asks = self.connection()
+
+    def connection(self):
+        """A further connection to the relay here, with the key of there."""
+        own = self.hosts.keys["there"].own()
+        made = self.context.socket(zmq.DEALER)
+        made.setsockopt(zmq.LINGER, 0)
+        made.setsockopt_string(zmq.CURVE_SERVERKEY, self.hosts.keys["here"].own().public)
+        made.setsockopt_string(zmq.CURVE_PUBLICKEY, own.public)
+        made.setsockopt_string(zmq.CURVE_SECRETKEY, own.secret)
+        made.connect(f"tcp://127.0.0.1:{self.hosts.ports['here']}")
+        return made
+
+    def give(self, *frames):
+        """Sends to the relay here, as its offer there would."""
+        self.hosts.until(lambda: self.offer.poll(0))
+        identity = self.offer.recv_multipart()[0]
+        self.offer.send_multipart([identity, *frames])
+
+    def ask(self, *frames):
+        """Sends to the relay here, as a request from there would."""
+        self.asks.send_multipart(frames)
+
+    def close(self):
+        self.offer.close(linger=0)
+        self.asks.close(linger=0)
+        self.gate.close()
+        self.context.term()
+
+
+@pytest.fixture
+def other_host(two_hosts):
+    hosts = two_hosts((topics.RULES,), (topics.SPEECH, topics.ARM_TRAJECTORY), real_time=True)
+    members = hosts.settings["here"].peers["there"].model_copy(update={"members": ("tracker",)})
+    hosts.settings["here"] = hosts.settings["here"].model_copy(update={"peers": {"there": members}})
+    hosts.start("here")
+    other = OtherHost(hosts)
+    yield other
+    other.close()
+
+
+def trajectory(seconds):
+    """A trajectory captured at an impossible time, as a defective publisher would send it."""
+    message = JointTrajectory(id="move")
+    message.captured.seconds = seconds
+    payload = message.SerializeToString()
+    now_ns = time.monotonic_ns()
+    return pack(Envelope(schema_hash(JointTrajectory), 1, 2, 3, now_ns, now_ns), payload), payload
+
+
+@pytest.mark.parametrize("seconds", [-(2**63), -1, 9_000_000_001, 2**63 - 1])
+def test_an_impossible_time_is_rejected_and_ends_nothing(other_host, seconds):
+    hosts = other_host.hosts
+    beat = link.Beat(sent_ns=time.monotonic_ns(), there_ns=time.monotonic_ns())
+    other_host.give(beat.line())
+    other_host.give(link.Content(topic="arm/trajectory").line(), *trajectory(seconds))
+    hosts.until(lambda: "1 rejected" in hosts.relays["here"].detail)
+
+
+@pytest.mark.parametrize("time_ns", [-(2**63), -LATEST_NS - 1, 2**63 - 1])
+def test_an_impossible_time_in_a_header_is_rejected_and_ends_nothing(other_host, time_ns):
+    hosts = other_host.hosts
+    payload = Speech(text="one").SerializeToString()
+    header = pack(Envelope(schema_hash(Speech), 1, 2, 3, time_ns, time_ns), payload)
+    other_host.give(link.Beat(sent_ns=time.monotonic_ns(), there_ns=0).line())
+    other_host.give(link.Content(topic="speech").line(), header, payload)
+    hosts.until(lambda: "1 rejected" in hosts.relays["here"].detail)
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        (b"",),
+        (b"[" * 60_000,),
+        (b'{"kind": ["want"]}',),
+        (b'{"kind": "beat", "sent_ns": 1e999}',),
+        (b'{"kind": "beat", "sent_ns": -1}',),
+        (b'{"kind": "want", "names": {"a": 1}}',),
+        (b'{"kind": "taken", "topic": "camera/image"}', b"more"),
+        (b'{"kind": "answered"}',),
+        (b'{"kind": "answered"}', b"no header", b"no answer"),
+        (b"\xff\x00",) * 30,
+    ],
+)
+def test_what_is_no_request_is_rejected_and_ends_nothing(other_host, frames):
+    hosts = other_host.hosts
+    other_host.ask(*frames)
+    hosts.until(lambda: "1 rejected" in hosts.relays["here"].detail)
+
+
+def test_answers_of_invented_members_open_nothing_and_fill_no_log(other_host, caplog):
+    hosts = other_host.hosts
+    before = len(os.listdir("/proc/self/fd"))
+    for number in range(1100):
+        payload = TickDone(node=f"invented_{number}", pid=number, kind=TickDone.KIND_JOIN).SerializeToString()
+        header = pack(Envelope(schema_hash(TickDone), 0, 0, 0, 0, 0), payload)
+        other_host.ask(link.Answered().line(), header, payload)
+    hosts.until(lambda: "1100 rejected" in hosts.relays["here"].detail)
+    assert len(os.listdir("/proc/self/fd")) < before + 20
+    assert sum("rejected" in record.getMessage() for record in caplog.records) < 10
+
+
+def test_invented_images_keep_no_memory(other_host):
+    hosts = other_host.hosts
+    for number in range(300):
+        other_host.ask(link.Taken(topic=f"{number:01900d}").line())
+    hosts.until(lambda: "300 rejected" in hosts.relays["here"].detail)
+    (asker,) = hosts.relays["here"]._offers[0].askers.values()
+    assert not asker.under_way
+    assert not asker.waiting
+
+
+def test_more_connections_than_a_host_needs_are_not_served(other_host):
+    hosts = other_host.hosts
+    with contextlib.ExitStack() as opened:
+        for _ in range(20):
+            opened.enter_context(other_host.connection()).send(link.Want(names=[]).line())
+        hosts.until(lambda: "rejected" in hosts.relays["here"].detail)
+        assert len(hosts.relays["here"]._offers[0].askers) == link.MOST_CONNECTIONS
+
+
+def test_a_clock_that_jumped_is_shown(other_host):
+    hosts = other_host.hosts
+    for ahead_ns in (0, 10**12):
+        now_ns = time.monotonic_ns()
+        other_host.give(link.Beat(sent_ns=now_ns, there_ns=now_ns + ahead_ns).line())
+    hosts.until(lambda: "1 jumps" in hosts.relays["here"].detail)

@@ -13,6 +13,7 @@ from .envelope import FLAG_RING as FLAG_RING
 from .envelope import FLAG_WELCOME as FLAG_WELCOME
 from .envelope import SIZE as SIZE
 from .envelope import Envelope as Envelope
+from .envelope import Reason as Reason
 from .envelope import RejectedError as RejectedError
 from .envelope import pack as pack
 from .envelope import unpack as unpack
@@ -33,6 +34,7 @@ from .node import is_first_start as is_first_start
 from .node import main as main
 from .node import publish_each as publish_each
 from .node import read_node_file as read_node_file
+from .publisher import ImpossibleTimeError as ImpossibleTimeError
 from .publisher import Publisher as Publisher
 from .recorded import RecordedBus as RecordedBus
 from .schemas import schema_hash as schema_hash
@@ -41,8 +43,11 @@ from .settings import BusSettings as BusSettings
 from .settings import default_folder as default_folder
 from .settings import lock_of as lock_of
 from .settings import nodes_in as nodes_in
+from .soundness import LATEST_NS as LATEST_NS
+from .soundness import unsound as unsound
 from .subscriber import Received as Received
 from .subscriber import Subscriber as Subscriber
+from .subscriber import decoded as decoded
 from .ticks import TICK_PERIOD_NS as TICK_PERIOD_NS
 from .ticks import Tick as Tick
 from .topics import CLOCK as CLOCK

@@ -141,15 +141,21 @@ class LockstepBarrier:
                 unpack(frames[1], frames[2], schema_hash(TickDone), MAX_ANSWER_BYTES)
                 answer = TickDone.FromString(frames[2])
             except (RejectedError, DecodeError) as error:
-                self.rejected += 1
-                if is_logged(self.rejected):
-                    _log.warning("lockstep: answer rejected (number %d): %s", self.rejected, error)
+                self._reject(str(error))
                 continue
             changed |= self._take(answer)
         return changed
 
+    def _reject(self, reason: str) -> None:
+        self.rejected += 1
+        if is_logged(self.rejected):
+            _log.warning("lockstep: answer rejected (number %d): %s", self.rejected, reason)
+
     def _take(self, answer: TickDone) -> bool:
-        node = answer.node
+        node, marks = answer.node, to_marks(answer.published)
+        if marks.get(member_mark(node), (0, 0))[0] != answer.pid:
+            self._reject(f"it comes from {node!r:.60} without the mark of its process {answer.pid}")
+            return False
         if answer.kind == TickDone.KIND_JOIN:
             if node in self._marks:
                 self._remove(node, "was started again")
@@ -158,7 +164,7 @@ class LockstepBarrier:
             return True
         if node not in self._marks or self._marks[node][member_mark(node)][0] != answer.pid:
             return False  # of a process that is no longer a member
-        self._marks[node] = to_marks(answer.published)
+        self._marks[node] = marks
         if answer.kind == TickDone.KIND_LEAVE:
             self._remove(node, "left")
         elif answer.tick == self.tick:
@@ -178,8 +184,8 @@ class LockstepBarrier:
         self._unwatch(node)
         try:
             self._pidfds[node] = os.pidfd_open(pid)
-        except OSError as error:
-            _log.warning("lockstep: %s cannot join as process %d: %s", node, pid, error.strerror)
+        except (OSError, OverflowError) as error:  # OverflowError: no process has such a number
+            self._reject(f"{node!r:.60} cannot join as process {pid}: {error}")
             return False
         self._exchange.watch_descriptor(self._pidfds[node])
         return True

@@ -16,8 +16,8 @@ header has 56 bytes, little-endian:
     48      4     payload length
     52      4     CRC-32 of the payload and of the 52 bytes above
 
-Checked in the order size, magic, version, schema, length, CRC; the subscriber then checks the sequence and decodes
-last. Protobuf alone would accept most damaged messages.
+Checked in the order size, magic, version, schema, length, CRC; the subscriber then checks the sequence and the
+times and decodes last. Protobuf alone would accept most damaged messages.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ import zlib
 from typing import NamedTuple
 
 from paramove.bus.schemas import type_of_hash
+from paramove.bus.soundness import LATEST_NS
 
 MAGIC = 0x4D50
 VERSION = 1
@@ -46,7 +47,10 @@ FLAG_RING = 4
 
 
 class Reason(enum.Enum):
-    """Why a message was rejected. NUMBER: it holds NaN, infinity, a number above 1e12, or an invalid time."""
+    """Why a message was rejected.
+
+    NUMBER: it holds NaN, infinity, a number above 1e12, an impossible time, or an enumeration's value without a name.
+    """
 
     CONNECTION = "connection"
     FRAMES = "frames"
@@ -87,6 +91,11 @@ class Envelope(NamedTuple):
     def is_welcome(self) -> bool:
         """Whether it was sent because of a new subscription."""
         return bool(self.flags & FLAG_WELCOME)
+
+    @property
+    def has_possible_times(self) -> bool:
+        """Whether a clock can have shown its times; what was measured before simulated time began is negative."""
+        return abs(self.published_ns) <= LATEST_NS and abs(self.captured_ns) <= LATEST_NS
 
     @property
     def has_message(self) -> bool:

@@ -14,11 +14,17 @@ from paramove.bus.envelope import FLAG_LAST_VALUE, FLAG_RING, FLAG_WELCOME, Enve
 from paramove.bus.image_ring import SMALLEST, RingWriter
 from paramove.bus.monitor import can_read
 from paramove.bus.schemas import schema_hash
+from paramove.bus.soundness import LATEST_S, impossible_time
 from paramove.bus.topics import Profile, Topic
 
 _NOBLOCK = int(zmq.NOBLOCK)
 _NOBLOCK_SNDMORE = int(zmq.NOBLOCK | zmq.SNDMORE)
 """As plain numbers: to combine enums takes longer than to send."""
+
+
+class ImpossibleTimeError(ValueError):
+    """A message with a time that no clock has; the text names the field and its value."""
+
 
 LINGER_MS = 500
 """How long closing waits for messages published just before."""
@@ -77,6 +83,8 @@ class Publisher:
 
         Raises:
             TypeError: the topic carries another type.
+            ImpossibleTimeError: a time in it is negative, or one in it or given here is beyond `LATEST_NS`. Never for
+                a request, as a stop counts whatever clock its sender has.
             ValueError: the message is larger than the topic allows.
         """
         if type(message) is not self.topic.type:
@@ -87,8 +95,9 @@ class Publisher:
             raise ValueError(
                 f"message on {self.topic.name} has {len(payload)} bytes, the topic allows {self.topic.max_bytes}"
             )
-        self.sequence += 1
-        envelope = Envelope(self._schema, self._publisher, self.epoch, self.sequence, now_ns, captured_ns)
+        envelope = Envelope(self._schema, self._publisher, self.epoch, self.sequence + 1, now_ns, captured_ns)
+        self._check_times(message, envelope)
+        self.sequence = envelope.sequence
         if self.topic.profile is Profile.LATCHED:
             self._last = (envelope, payload)
         self._share(envelope, payload)
@@ -131,6 +140,15 @@ class Publisher:
             self.subscribers.add(node)
         else:
             self.subscribers.discard(node)
+
+    def _check_times(self, message: Any, envelope: Envelope) -> None:
+        if self.topic.is_request:
+            return
+        impossible = impossible_time(message)
+        if not impossible and not envelope.has_possible_times:
+            impossible = f"it is captured at {envelope.captured_ns} ns and published at {envelope.published_ns} ns"
+        if impossible:
+            raise ImpossibleTimeError(f"message on {self.topic.name}: {impossible}; at most {LATEST_S} s expected")
 
     def _welcome(self) -> None:
         if self._last is not None:

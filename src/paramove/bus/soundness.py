@@ -1,6 +1,7 @@
-"""Checks the numbers in a message: finite, below 1e12, valid times.
+"""Checks the numbers in a message: finite, below 1e12, valid times, known values of enumerations.
 
-Protobuf carries NaN and infinity, and a clamp may turn NaN into full travel. So no such message reaches a node.
+Protobuf carries NaN and infinity, and a clamp may turn NaN into full travel. It also carries any number in place of an
+enumeration's value, which then has no name. So no such message reaches a node.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ LARGEST = 1e12
 """Of any number; real values in SI units, pixels or counts are far smaller."""
 LATEST_S = 9_000_000_000
 """Of times; nanoseconds since the epoch of any clock have to fit into 64 bits."""
+LATEST_NS = LATEST_S * 1_000_000_000
 
 _FLOATS = (FieldDescriptor.TYPE_DOUBLE, FieldDescriptor.TYPE_FLOAT)
 _TIMES = ("google.protobuf.Timestamp", "google.protobuf.Duration")
@@ -25,7 +27,16 @@ _Check = Callable[[Any], str]
 
 def unsound(message: Any) -> str:
     """Path and value of the first bad number of a message, such as `points[3].time_s is nan`; "" for none."""
-    for check in _checks(message.DESCRIPTOR):
+    return _first(message, False)
+
+
+def impossible_time(message: Any) -> str:
+    """Path and value of the first impossible time of a message; "" for none. Takes less time than `unsound`."""
+    return _first(message, True)
+
+
+def _first(message: Any, times_only: bool) -> str:
+    for check in _checks(message.DESCRIPTOR, times_only):
         reason = check(message)
         if reason:
             return reason
@@ -33,50 +44,67 @@ def unsound(message: Any) -> str:
 
 
 @cache
-def _checks(descriptor: Descriptor) -> tuple[_Check, ...]:
+def _checks(descriptor: Descriptor, times_only: bool) -> tuple[_Check, ...]:
     """The checks of a message type; none for a type without numbers."""
     if descriptor.full_name in _TIMES:
         return (_time,)
     form = DescriptorProto()
     descriptor.CopyToProto(form)  # has the labels in every release of protobuf
     repeated = {one.name for one in form.field if one.label == FieldDescriptorProto.LABEL_REPEATED}
-    made = (_check_of(one, one.name in repeated) for one in descriptor.fields if _is_number(one) or _holds_numbers(one))
-    return tuple(made)
+    made = (_check_of(field, field.name in repeated, times_only) for field in descriptor.fields)
+    return tuple(check for check in made if check is not None)
 
 
-def _is_number(one: FieldDescriptor) -> bool:
-    return one.type in _FLOATS
-
-
-def _holds_numbers(one: FieldDescriptor) -> bool:
-    return one.message_type is not None and bool(_checks(one.message_type))
-
-
-def _check_of(one: FieldDescriptor, repeated: bool) -> _Check:
-    name, is_number = one.name, _is_number(one)
+def _check_of(field: FieldDescriptor, repeated: bool, times_only: bool) -> _Check | None:
+    """The check of one field; None where nothing in it is to be checked."""
+    name = field.name
+    if field.message_type is not None:
+        if not _checks(field.message_type, times_only):
+            return None
+        if repeated:
+            return lambda message: _inside_many(name, getattr(message, name), times_only)
+        return lambda message: _inside(name, getattr(message, name), times_only) if message.HasField(name) else ""
+    if times_only:
+        return None
+    if field.enum_type is not None:
+        known = frozenset(field.enum_type.values_by_number)
+        return lambda message: _of_enumeration(name, getattr(message, name), known, repeated)
+    if field.type not in _FLOATS:
+        return None
     if repeated:
-        return lambda message: _of_many(name, getattr(message, name), is_number)
-    if is_number:
-        return lambda message: _of_number(name, getattr(message, name))
-    return lambda message: _inside(name, getattr(message, name)) if message.HasField(name) else ""
+        return lambda message: _of_many(name, getattr(message, name))
+    return lambda message: _of_number(name, getattr(message, name))
 
 
 def _of_number(name: str, value: float) -> str:
     return "" if -LARGEST <= value <= LARGEST else f"{name} is {value:g}"
 
 
-def _of_many(name: str, values: Any, are_numbers: bool) -> str:
-    if are_numbers and sum(map(abs, values)) <= LARGEST:
+def _of_many(name: str, values: Any) -> str:
+    if sum(map(abs, values)) <= LARGEST:
         return ""
     for index, value in enumerate(values):
-        reason = _of_number(f"{name}[{index}]", value) if are_numbers else _inside(f"{name}[{index}]", value)
+        reason = _of_number(f"{name}[{index}]", value)
         if reason:
             return reason
     return ""
 
 
-def _inside(name: str, message: Any) -> str:
-    reason = unsound(message)
+def _of_enumeration(name: str, found: Any, known: frozenset[int], repeated: bool) -> str:
+    unknown = set(found if repeated else (found,)) - known
+    return f"{name} is {min(unknown)}, which has no name" if unknown else ""
+
+
+def _inside_many(name: str, messages: Any, times_only: bool) -> str:
+    for index, message in enumerate(messages):
+        reason = _inside(f"{name}[{index}]", message, times_only)
+        if reason:
+            return reason
+    return ""
+
+
+def _inside(name: str, message: Any, times_only: bool) -> str:
+    reason = _first(message, times_only)
     return f"{name}.{reason}" if reason else ""
 
 

@@ -20,7 +20,7 @@ from paramove.bus.log_format import is_logged
 from paramove.bus.monitor import Monitor, can_read
 from paramove.bus.schemas import schema_hash
 from paramove.bus.sequence import Arrival, SequenceCounter
-from paramove.bus.soundness import unsound
+from paramove.bus.soundness import LATEST_NS, unsound
 from paramove.bus.topics import Topic
 from paramove.msgs.node_status_pb2 import NodeStatus
 
@@ -55,6 +55,21 @@ class Received:
     published_ns: int
     sequence: int
     resent: bool = False
+
+
+def decoded(topic: Topic, payload: bytes) -> Any:
+    """The message of a topic; raises RejectedError for a payload that is none, or has unsound numbers.
+
+    A request may have any numbers: nobody reads them, and a stop counts whatever clock its sender has.
+    """
+    try:
+        message = topic.type.FromString(payload)
+    except (DecodeError, ValueError) as error:
+        raise RejectedError(Reason.DECODE, f"payload is not a {topic.type_name}: {error}") from error
+    unsound_number = unsound(message)
+    if unsound_number and not topic.is_request:
+        raise RejectedError(Reason.NUMBER, f"{unsound_number}; finite numbers expected, correct the publisher")
+    return message
 
 
 class Subscriber:
@@ -111,6 +126,7 @@ class Subscriber:
             try:
                 if not self._budget.admits(envelope.epoch, envelope.published_ns):
                     raise RejectedError(Reason.BUDGET, self._budget_message())
+                self._check_times(envelope)
                 message = self._decode(payload)
             except RejectedError as error:
                 self.counter.messages -= 1
@@ -222,14 +238,12 @@ class Subscriber:
         return envelope, payload
 
     def _decode(self, payload: bytes) -> Any:
-        try:
-            message = self.topic.type.FromString(payload)
-        except (DecodeError, ValueError) as error:
-            raise RejectedError(Reason.DECODE, f"payload is not a {self.topic.type_name}: {error}") from error
-        unsound_number = unsound(message)
-        if unsound_number and not self.topic.is_request:
-            raise RejectedError(Reason.NUMBER, f"{unsound_number}; finite numbers expected, correct the publisher")
-        return message
+        return decoded(self.topic, payload)
+
+    def _check_times(self, envelope: Envelope) -> None:
+        if not self.topic.is_request and not envelope.has_possible_times:
+            times = f"published at {envelope.published_ns} ns, captured at {envelope.captured_ns} ns"
+            raise RejectedError(Reason.NUMBER, f"{times}: at most {LATEST_NS} ns expected")
 
     def _reject(self, error: RejectedError) -> None:
         self.counter.rejected[error.reason] += 1

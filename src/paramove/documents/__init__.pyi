@@ -17,6 +17,12 @@ from .files import read_text as read_text
 from .files import size_of as size_of
 from .files import unreadable as unreadable
 from .input_error import InputError as InputError
+from .messages import Lines as Lines
+from .messages import Message as Message
+from .messages import MessageError as MessageError
+from .messages import MessageReader as MessageReader
+from .messages import Pid as Pid
+from .messages import Text as Text
 from .names import FileName as FileName
 from .names import Identifier as Identifier
 from .names import checked_name as checked_name

@@ -6,7 +6,7 @@ from typing import Any
 
 from google.protobuf.descriptor import Descriptor, FieldDescriptor  # type: ignore[import-untyped]
 
-from paramove.bus import Envelope, Topic, topics
+from paramove.bus import LATEST_NS, Envelope, Reason, RejectedError, Topic, decoded, topics
 from paramove.hosts.clock_offset import ClockOffset
 
 LARGEST_BOUND_NS = 5_000_000
@@ -31,12 +31,12 @@ def in_own_time(
         now_ns: Time here.
 
     Raises:
-        DecodeError: The payload is no message of the topic.
+        RejectedError: The payload is no sound message of the topic, or a time in it is before this host's clock began.
         UnknownTimeError: No reply has shown what time it is there; or a command to move or arm, and the clock's offset
             is not known to `LARGEST_BOUND_NS`. Never for a request to stop or to disarm, which has no age: its times
             become the time here.
     """
-    message = topic.type.FromString(payload)
+    message = decoded(topic, payload)
     if topic.is_request and not getattr(message, "armed", False):
         message.captured.FromNanoseconds(now_ns)
         return envelope._replace(published_ns=now_ns, captured_ns=now_ns), message
@@ -46,8 +46,20 @@ def in_own_time(
         raise UnknownTimeError(f"the clock there is known to {1e-6 * bound_ns:.1f} ms only, so its age is not known")
     ahead_ns = clock.offset_ns(now_ns)
     _set_back(message, ahead_ns)
-    times = envelope.published_ns - ahead_ns, envelope.captured_ns - ahead_ns
-    return envelope._replace(published_ns=times[0], captured_ns=times[1]), message
+    moved = envelope._replace(
+        published_ns=envelope.published_ns - ahead_ns, captured_ns=envelope.captured_ns - ahead_ns
+    )
+    if not (envelope.has_possible_times and moved.has_possible_times):
+        raise RejectedError(Reason.NUMBER, f"its header has the time {envelope.published_ns} ns, which never was")
+    return moved, message
+
+
+def _earlier(time_ns: int, by_ns: int) -> int:
+    if not 0 <= time_ns - by_ns <= LATEST_NS:
+        raise RejectedError(
+            Reason.NUMBER, f"a time of {time_ns} ns there is {time_ns - by_ns} ns by the clock here, which never was"
+        )
+    return time_ns - by_ns
 
 
 def _set_back(message: Any, by_ns: int) -> None:
@@ -57,7 +69,7 @@ def _set_back(message: Any, by_ns: int) -> None:
             continue
         for part in value if field.label == FieldDescriptor.LABEL_REPEATED else (value,):
             if field.message_type.full_name == _TIMESTAMP:
-                part.FromNanoseconds(part.ToNanoseconds() - by_ns)
+                part.FromNanoseconds(_earlier(part.ToNanoseconds(), by_ns))
             else:
                 _set_back(part, by_ns)
 

@@ -34,7 +34,7 @@ from paramove.bus import (
     Topic,
     answers_socket,
     can_read,
-    is_logged,
+    decoded,
     member_mark,
     member_socket,
     pack,
@@ -46,15 +46,17 @@ from paramove.hosts.clock_offset import ClockOffset
 from paramove.hosts.keys import HostKeyError, HostKeys
 from paramove.hosts.link import (
     BEAT_S,
-    DONE,
     IMAGES_BEAT_S,
     MAX_ASKED_BYTES,
-    MESSAGE,
-    TAKEN,
+    MOST_AT_ONCE,
+    Answered,
     Asker,
+    Content,
     Gatekeeper,
     Offer,
+    Rejections,
     Request,
+    Taken,
 )
 from paramove.hosts.own_time import LARGEST_BOUND_NS, UnknownTimeError, in_own_time
 from paramove.hosts.settings import RelaySettings
@@ -93,9 +95,10 @@ class Relay:
         self._gate = Gatekeeper(away, {host: peer.key for host, peer in settings.peers.items()})
         self._opened.callback(self._gate.close)
         self._poller = zmq.Poller()
+        self._rejections = Rejections()
         endpoint = f"tcp://{settings.address}:"
         self._offers = tuple(
-            Offer(away, f"{endpoint}{settings.port + index}", own, settings.peers, f"relay {name}")
+            Offer(away, f"{endpoint}{settings.port + index}", own, settings.peers, f"relay {name}", self._rejections)
             for index, name in enumerate(("topics", "images"))
         )
         self._foreign = [offer.foreign for offer in self._offers]
@@ -111,14 +114,16 @@ class Relay:
             for name in peer.wants.keys() - self._sources.keys():  # a topic may cross to several hosts
                 self._sources[name] = _Source(self._here, bus, rows[name], name)
             images = frozenset(name for name in peer.gives if rows[name].is_image)
+            largest = max((rows[name].max_bytes for name in peer.gives), default=0)
+            reach = host, self._rejections, max(largest, MAX_ASKED_BYTES)
             self._requests[host] = (
-                Request(away, peer.port, own, peer, frozenset(peer.gives) - images, beat_s),
-                Request(away, peer.port + 1, own, peer, images),
+                Request(away, peer.port, own, peer, frozenset(peer.gives) - images, *reach, beat_s),
+                Request(away, peer.port + 1, own, peer, images, *reach),
             )
         bus.exchange.forwards(self._sources)
         self._answers: _Answers | None = None
         if settings.clock_from is not None:
-            self._answers = _Answers(self._here, bus)
+            self._answers = _Answers(self._here, bus, frozenset(settings.members))
             self._foreign.append(self._answers.foreign)
             self._owned.callback(self._answers.ownership.release)
         self._members: dict[str, zmq.Socket[Any]] = {}
@@ -153,8 +158,7 @@ class Relay:
         )
 
     def _links(self) -> str:
-        rejected = self._gate.rejected + sum(offer.rejected for offer in self._offers)
-        rejected += sum(request.rejected for request in self._each_request())
+        rejected = self._gate.rejected + self._rejections.total
         links = [
             f"{host}: {_milliseconds(data.round_trip_s)}{_about(data.clock) if self._real_time else ''}"
             for host, (data, _) in sorted(self._requests.items())
@@ -178,11 +182,11 @@ class Relay:
             for envelope, payload in source.messages() if source.subscriber.socket in ready else ():
                 self._send_all(source, envelope, payload)
         for offer in self._offers:
-            for asker, kind, frames, new in offer.requests() if offer.socket in ready else ():
-                if kind == DONE and len(frames) == 2:
-                    self._answer(frames)
-                elif kind == TAKEN and frames:
-                    self._taken(offer, asker, frames[0].decode("utf-8", "replace"))
+            for asker, message, behind, new in offer.requests() if offer.socket in ready else ():
+                if isinstance(message, Answered):
+                    self._answer(asker.host, *behind)
+                elif isinstance(message, Taken):
+                    self._taken(offer, asker, message.topic)
                 for name in sorted(new):
                     self._greet(offer, asker, self._sources[name])
         for host, requests in self._requests.items():
@@ -193,7 +197,7 @@ class Relay:
         if self._answers is not None and self._settings.clock_from is not None:
             request = self._requests[self._settings.clock_from][0]
             for header, payload in self._answers.collect() if request.is_up else ():
-                request.send(DONE, header, payload)
+                request.send(Answered(), header, payload)
 
     def _each_request(self) -> list[Request]:
         return [request for pair in self._requests.values() for request in pair]
@@ -225,28 +229,30 @@ class Relay:
                 continue
             if is_image and asker.under_way[source.name] >= UNDER_WAY:
                 asker.waiting[source.name] = frames  # the one that waited is no longer the latest
-            elif offer.send(asker, MESSAGE, *frames):
+            elif offer.send(asker, source.head, *frames):
                 asker.under_way[source.name] += is_image
 
     def _taken(self, offer: Offer, asker: Asker, name: str) -> None:
         asker.under_way[name] = max(0, asker.under_way[name] - 1)
         if name in asker.waiting:
-            asker.under_way[name] += offer.send(asker, MESSAGE, *asker.waiting.pop(name))
+            asker.under_way[name] += offer.send(asker, self._sources[name].head, *asker.waiting.pop(name))
 
     def _greet(self, offer: Offer, asker: Asker, source: _Source) -> None:
         """A host that asks anew gets the state of the topic: from where on to count, and the last value."""
         state = source.state()
         if state is not None:
-            offer.send(asker, MESSAGE, *source.frames(*state))
+            offer.send(asker, source.head, *source.frames(*state))
 
-    def _answer(self, frames: list[bytes]) -> None:
+    def _answer(self, host: str, header: bytes, payload: bytes) -> None:
         """A member on another host has answered a tick: this process stands for it at the simulator's."""
-        header, payload = frames
         try:
             envelope = unpack(header, payload, schema_hash(TickDone), MAX_ASKED_BYTES)
             answer = TickDone.FromString(payload)
         except (RejectedError, DecodeError) as error:
-            _log.warning("lockstep: answer from another host rejected: %s", error)
+            self._rejections.add(host, f"answer of lockstep: {error}")
+            return
+        if answer.node not in self._settings.peers[host].members:
+            self._rejections.add(host, f"answer of lockstep: {answer.node!r:.60} is no member on that host")
             return
         answer.watched_pid = os.getpid()
         payload = answer.SerializeToString()
@@ -265,16 +271,14 @@ class Relay:
         try:
             envelope = unpack(header, payload, schema_hash(topic.type), topic.max_bytes)
             if topic.is_image and not envelope.is_welcome:
-                request.send(TAKEN, name.encode())
+                request.send(Taken(topic=name))
             if self._real_time and envelope.has_message:
                 clock = self._requests[host][0].clock
                 envelope, message = in_own_time(topic, envelope, payload, clock, now_ns)
             elif away is not None and envelope.has_message:
-                message = topic.type.FromString(payload)
-        except (RejectedError, DecodeError, UnknownTimeError) as error:
-            request.rejected += 1
-            if is_logged(request.rejected):
-                _log.warning("topic %s: message from %s rejected: %s (number %d)", name, host, error, request.rejected)
+                message = decoded(topic, payload)
+        except (RejectedError, UnknownTimeError) as error:
+            self._rejections.add(host, f"topic {name}: {error}")
             return
         if away is None:
             payload = payload if message is None else message.SerializeToString(deterministic=True)
@@ -317,27 +321,36 @@ def _about(clock: ClockOffset) -> str:
     bound_ns = clock.bound_ns(now_ns)
     if not math.isfinite(bound_ns):
         return ""
+    jumps = f", {clock.jumps} jumps" if clock.jumps else ""
     drifts = "" if drift is None else f", drift {1e6 * drift[0]:+.0f} ± {1e6 * drift[1]:.0f} ppm"
-    return f", clock {1e-9 * clock.offset_ns(now_ns):+.3f} s ± {math.ceil(1e-6 * bound_ns)} ms{drifts}"
+    return f", clock {1e-9 * clock.offset_ns(now_ns):+.3f} s ± {math.ceil(1e-6 * bound_ns)} ms{drifts}{jumps}"
 
 
 class _Source:
-    """One topic of this host, as it is published."""
+    """One topic of this host, as it is published.
+
+    Attributes:
+        head: First frame of its messages on a link.
+    """
 
     def __init__(self, context: zmq.Context[Any], bus: Bus, topic: Topic, name: str) -> None:
         self.topic, self.name = topic, name
+        self.head = Content(topic=name)
         self.subscriber = Subscriber(context, bus.settings.folder, topic, name, bus.node)
         self._known: tuple[int | None, int] = (None, 0)
         self._last: tuple[Envelope, bytes] | None = None
 
     def frames(self, envelope: Envelope, payload: bytes) -> list[bytes]:
-        """A message of the topic as it crosses."""
-        return [self.name.encode() + b"\0" + pack(envelope, payload), payload]
+        """Header and payload of a message as it crosses."""
+        return [pack(envelope, payload), payload]
 
     def messages(self) -> list[tuple[Envelope, bytes]]:
         """What has come in; a welcome where only that has shown how far the publisher is."""
         found = []
-        while (raw := self.subscriber.receive_raw()) is not None:
+        for _ in range(MOST_AT_ONCE):
+            raw = self.subscriber.receive_raw()
+            if raw is None:
+                break
             envelope, payload = raw
             envelope = envelope._replace(flags=envelope.flags & ~FLAG_RING)
             self._known = (envelope.epoch, envelope.sequence)
@@ -362,9 +375,10 @@ class _Source:
 
 
 class _Answers:
-    """Answers of this host's members of lockstep, whose simulator runs on another host."""
+    """Answers of this host's members of lockstep, whose simulator runs on another host; others are left out."""
 
-    def __init__(self, context: zmq.Context[Any], bus: Bus) -> None:
+    def __init__(self, context: zmq.Context[Any], bus: Bus, members: frozenset[str]) -> None:
+        self._members = members
         self.socket, self.ownership, self.foreign = answers_socket(
             context, bus.settings.folder, bus.node, MAX_ASKED_BYTES
         )
@@ -373,22 +387,29 @@ class _Answers:
     def collect(self) -> list[tuple[bytes, bytes]]:
         """Header and answer of each, and a farewell for a member that has ended without one."""
         found = []
-        while can_read(self.socket):
+        for _ in range(MOST_AT_ONCE):
+            if not can_read(self.socket):
+                break
             frames = self.socket.recv_multipart(zmq.NOBLOCK)
-            if len(frames) == 3 and len(frames[1]) == SIZE:
-                self._follow(frames[2])
+            if len(frames) == 3 and len(frames[1]) == SIZE and self._follow(frames[2]):
                 found.append((frames[1], frames[2]))
         ended = select.select([descriptor for _, descriptor in self._pidfds.values()], [], [], 0.0)[0]
         return found + [self._farewell(node) for node, (_, its) in list(self._pidfds.items()) if its in ended]
 
-    def _follow(self, payload: bytes) -> None:
-        with contextlib.suppress(DecodeError, OSError):
+    def _follow(self, payload: bytes) -> bool:
+        """Whether it is an answer of a member; the process of one that joins is watched."""
+        try:
             answer = TickDone.FromString(payload)
-            if answer.kind == TickDone.KIND_JOIN:
-                self._forget(answer.node)
+        except DecodeError:
+            return False
+        if answer.node not in self._members:
+            return False
+        if answer.kind in (TickDone.KIND_JOIN, TickDone.KIND_LEAVE):
+            self._forget(answer.node)
+        if answer.kind == TickDone.KIND_JOIN:
+            with contextlib.suppress(OSError, OverflowError):  # no process has this number
                 self._pidfds[answer.node] = (answer.pid, os.pidfd_open(answer.pid))
-            elif answer.kind == TickDone.KIND_LEAVE:
-                self._forget(answer.node)
+        return True
 
     def _farewell(self, node: str) -> tuple[bytes, bytes]:
         pid = self._pidfds[node][0]

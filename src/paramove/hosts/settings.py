@@ -16,6 +16,7 @@ class Peer(BaseModel):
         key: Its public key.
         wants: Topics that it gets from here: name on the bus -> row of the table.
         gives: Topics that come from there, likewise.
+        members: Nodes there that lockstep waits for.
         commands: Whether the arm's commands come from there, so that the arm stops when the link is lost.
     """
 
@@ -26,6 +27,7 @@ class Peer(BaseModel):
     key: str
     wants: dict[str, str] = Field(default_factory=dict)
     gives: dict[str, str] = Field(default_factory=dict)
+    members: tuple[str, ...] = ()
     commands: bool = False
 
 
@@ -36,6 +38,7 @@ class RelaySettings(BaseModel):
         address, port: Where it listens.
         peers: The other hosts, by their names in the launch file.
         keys: Folder of keys; default: the user's.
+        members: Nodes of this host that lockstep waits for.
         clock_from: In lockstep, the host of the clock if it is another one: answers to ticks go there.
     """
 
@@ -45,4 +48,5 @@ class RelaySettings(BaseModel):
     port: int
     peers: dict[str, Peer] = Field(min_length=1)
     keys: Path | None = None
+    members: tuple[str, ...] = ()
     clock_from: str | None = None

@@ -130,7 +130,9 @@ def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostK
         if host.ssh is not None and host.ssh not in trusted:
             raise InputError(f"{host.ssh} is not trusted yet: paramove host trust {host.ssh}")
         key = keys.own().public if host.ssh is None else trusted[host.ssh]
-        peers[name] = Peer(address=host.address or _address(name, file.hosts), port=host.port, key=key)
+        members = tuple(_members(file, name, own))
+        address = host.address or _address(name, file.hosts)
+        peers[name] = Peer(address=address, port=host.port, key=key, members=members)
     nodes = {
         name: node.model_copy(update={"host": None if node.host == own else node.host})
         for name, node in file.nodes.items()
@@ -146,7 +148,13 @@ def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostK
         if not others:
             continue
         clock_from = clock if file.bus.lockstep and name != clock else None
-        settings = RelaySettings(address=peers[name].address, port=host.port, peers=others, clock_from=clock_from)
+        settings = RelaySettings(
+            address=peers[name].address,
+            port=host.port,
+            peers=others,
+            members=peers[name].members,
+            clock_from=clock_from,
+        )
         for node, its in interfaces.items() if any(peer.commands for peer in others.values()) else ():
             if (file.nodes[node].host or own) == name and topics.HOSTS_LINK in its.subscribes:
                 limit = {"link_timeout_s": LINK_TIMEOUT_S, **file.nodes[node].parameters}
@@ -165,6 +173,13 @@ def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostK
 
 
 _COMMANDS = frozenset(topic.name for topic in (topics.ARM_TRAJECTORY, *topics.ARMINGS))
+
+
+def _members(file: LaunchFile, host: str, own: str) -> Iterator[str]:
+    """Nodes of a host that lockstep waits for."""
+    for name, node in file.nodes.items():
+        if file.bus.lockstep and node.lockstep and (node.host or own) == host:
+            yield name
 
 
 def _relay(host: str) -> str:
