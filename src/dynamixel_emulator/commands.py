@@ -5,7 +5,9 @@
     dynamixel-emulator fault unplug --port ./koch-port         inject a fault into a running emulator
     dynamixel-emulator status --port ./koch-port               servos, and counts of its protocol checker
 
-Exit codes: 0; 2 invalid arguments; 66 a file, port or emulator does not exist; 78 it cannot be used.
+Exit codes: 0; 2 invalid arguments; 66 a file, port or emulator does not exist; 78 it cannot be used;
+70 it stopped while it ran, as in a world that
+became unstable.
 """
 
 from __future__ import annotations
@@ -21,12 +23,12 @@ from pathlib import Path
 from dynamixel_emulator.arms import ARMS, BAUD_RATE, chain_of
 from dynamixel_emulator.control import ControlSocket, request
 from dynamixel_emulator.emulator import DynamixelEmulator
-from dynamixel_emulator.errors import EmulatorError
+from dynamixel_emulator.errors import EmulatorError, EmulatorStoppedError
 from dynamixel_emulator.fault_commands import COMMANDS, FaultCommands
 from dynamixel_emulator.models import MODELS
 
 PORT = Path("dynamixel-port")
-MISSING, UNUSABLE = 66, 78
+MISSING, STOPPED, UNUSABLE = 66, 70, 78
 CHECK_INTERVAL_S = 0.5
 
 
@@ -39,6 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except EmulatorError as error:
         sys.stderr.write(f"{error}\n")
         return MISSING if error.missing else UNUSABLE
+    except EmulatorStoppedError as error:
+        sys.stderr.write(f"{error}\n")
+        return STOPPED
 
 
 def _parser(usage: str, description: str) -> argparse.ArgumentParser:

@@ -20,7 +20,7 @@ from types import TracebackType
 from typing import Self
 
 from dynamixel_emulator.bus import EmulatedBus
-from dynamixel_emulator.errors import EmulatorError
+from dynamixel_emulator.errors import EmulatorError, EmulatorStoppedError
 from dynamixel_emulator.mechanics import Mechanics
 from dynamixel_emulator.servo import EmulatedServo
 from dynamixel_emulator.wire_faults import WireFaults
@@ -110,9 +110,9 @@ class DynamixelEmulator:
         self._claimed.close()
 
     def check(self) -> None:
-        """Raises RuntimeError if the thread that serves the port has failed."""
+        """Raises EmulatorStoppedError if the thread that serves the port has failed."""
         if self._error is not None:
-            raise RuntimeError(f"the emulated servos have stopped: {self._error}") from self._error
+            raise EmulatorStoppedError(f"the emulated servos have stopped: {self._error}") from self._error
 
     def run_to(self, time_ns: int) -> None:
         """Lets servos and world run to a time since the start, if it is paced, and in the future; hold the lock.

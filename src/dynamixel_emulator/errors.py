@@ -18,6 +18,10 @@ class EmulatorError(ValueError):
         self.missing = missing
 
 
+class EmulatorStoppedError(RuntimeError):
+    """The emulated servos have stopped while they ran: their world became unstable, or their terminal went away."""
+
+
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Suggests the closest known word, or lists all of them, as a phrase for an error message."""
     choices = sorted(known)

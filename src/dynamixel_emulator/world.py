@@ -23,7 +23,8 @@ class MujocoMechanics:
 
     Args:
         world: MJCF file, or a model with its state. Its time step is set to 1 ms; its actuators are disabled, the
-            servos replace them.
+            servos replace them. RK4 is replaced by the implicit integrator: it takes the servos' damping at the
+            velocity before the step, with which a light link becomes unstable.
         joints: Driven joints in the order of the chain. Two servos may drive one joint.
         posture: Initial joint positions by name, rad; others as they are in the world.
         advance: Advances the world by a step, with whatever else moves in it; by default `mujoco.mj_step`.
@@ -42,6 +43,8 @@ class MujocoMechanics:
         self.model, self.data = world if isinstance(world, tuple) else _loaded(world)
         self._advance = advance or (lambda: mujoco.mj_step(self.model, self.data))
         self.model.opt.timestep = STEP_S
+        if self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+            self.model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
         numbers = [self._joint(joint.name) for joint in joints]
         self._qpos = np.array([self.model.jnt_qposadr[one] for one in numbers], dtype=np.intp)
@@ -74,7 +77,10 @@ class MujocoMechanics:
         self._advance()
         if self.data.warning.number.any():
             kinds = [mujoco.mjtWarning(number).name for number in np.flatnonzero(self.data.warning.number)]
-            raise RuntimeError(f"the emulated servos' world broke at {self.data.time:.3f} s: {', '.join(kinds)}")
+            raise RuntimeError(
+                f"the emulated servos' world broke at {self.data.time:.3f} s: {', '.join(kinds)}; "
+                "check masses, inertias and damping of its joints"
+            )
 
     def angles(self, names: Sequence[str]) -> list[float]:
         """Positions of these joints, rad or m."""

@@ -15,7 +15,7 @@ import pytest
 from dynamixel_sdk import COMM_SUCCESS, PacketHandler, PortHandler
 
 from dynamixel_emulator.arms import ARMS
-from dynamixel_emulator.commands import MISSING, UNUSABLE, control_of, main
+from dynamixel_emulator.commands import MISSING, STOPPED, UNUSABLE, control_of, main
 
 COMMAND = [sys.executable, "-m", "dynamixel_emulator"]
 TORQUE_ENABLE, GOAL_POSITION = 64, 116
@@ -107,6 +107,21 @@ def test_an_error_message_names_what_is_valid(
     for fact in facts:
         assert fact in message
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_emulator_whose_world_becomes_unstable_ends_with_the_cause(tmp_path, monkeypatch, capsys) -> None:
+    def step(*_: object) -> None:
+        raise RuntimeError("the world broke")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("dynamixel_emulator.world.MujocoMechanics.step", step)
+    (tmp_path / "world.xml").write_text(
+        '<mujoco><worldbody><body><joint name="servo_1"/><geom size="0.1" mass="1"/></body></worldbody></mujoco>'
+    )
+    assert main(("xl430_w250:1", "--world", "world.xml")) == STOPPED
+    message = capsys.readouterr().err
+    assert "the world broke" in message
+    assert len(message.splitlines()) == 1
 
 
 def test_an_unknown_fault_is_rejected_with_a_suggestion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,6 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dynamixel_emulator.body import OVERLOAD_S, HardwareError
+from dynamixel_emulator.bus import EmulatedBus
 from dynamixel_emulator.errors import EmulatorError
 from dynamixel_emulator.mechanics import DrivenJoint
 from dynamixel_emulator.models import (
@@ -17,6 +18,7 @@ from dynamixel_emulator.models import (
     XM430_W350,
 )
 from dynamixel_emulator.packets import ALERT, Instruction, StatusError
+from dynamixel_emulator.servo import EmulatedServo
 from dynamixel_emulator.world import MujocoMechanics
 from tests.robots.dynamixel.arm_world import COUNTS_PER_RAD, WORLD, Arm
 
@@ -327,6 +329,20 @@ def test_any_writes_leave_the_world_stable_and_torque_within_limits(tmp_path, mo
         for servo in arm.servos:
             assert abs(servo.torque) <= 2.01 * servo.model.stall_torque  # reversing adds the back-EMF
     assert all(math.isfinite(angle) for angle in (arm.angle(), arm.angle("elbow")))
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "Euler", "implicit"])
+def test_a_light_link_is_stable_with_any_integrator(integrator, tmp_path):
+    """Its servo's damping is much for so little inertia."""
+    path = tmp_path / "light.xml"
+    light = WORLD.format(mass=1e-4, damping=0.0).replace('armature="0.002"', "").replace('0.02"', '1e-4"')
+    path.write_text(light.replace("implicitfast", integrator))
+    mechanics = MujocoMechanics(path, [DrivenJoint("shoulder", COUNTS_PER_RAD), DrivenJoint("elbow", COUNTS_PER_RAD)])
+    bus = EmulatedBus([EmulatedServo(XM430_W350, number) for number in (1, 2)], mechanics)
+    for servo in bus.servos:
+        servo.hold()
+    bus.run_to(0.5)
+    assert abs(mechanics.angles(["shoulder"])[0]) < 0.02
 
 
 def test_an_invalid_world_is_rejected_with_its_cause(tmp_path):

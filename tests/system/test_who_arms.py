@@ -22,7 +22,13 @@ def test_servos_that_somebody_else_emulates_are_armed_by_no_program(tmp_path):
     with DynamixelEmulator(emulated_servos(ROBOT), link) as emulator:
         command = f"{LAUNCH} --set arm_driver.port={link} --runs {tmp_path / 'runs'}"
         with launched(command, environment) as running:
-            heard(running, "arm_driver", "degraded", f"{link} counts as a real arm", "does not belong to this launch")
+            heard(
+                running,
+                "arm_driver",
+                "degraded",
+                f"{link} counts as a real arm",
+                "was not started by the launcher of this run",
+            )
             heard(running, "waiting until a person arms the arm", REJECTED)
             with emulator.lock:
                 assert [servo.memory["Torque Enable"] for servo in emulator.bus.servos] == [0] * ROBOT.n_joints

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dynamixel_emulator.emulator import DynamixelEmulator
+from dynamixel_emulator.wire_faults import WireFaults
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.gravity_compensated_arm import TorqueOffArm
 from paramove.robots.dynamixel.arm.servo_arm import ServoArm
@@ -14,7 +15,7 @@ from paramove.robots.dynamixel.bus.position_watch import NOISE, PositionWatch
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_models import XL430_W250
 from sim.emulated_arm import emulated_servos
-from tests.robots.dynamixel.untrue_replies import OneAsTheNext, OneElsewhere
+from tests.robots.dynamixel.untrue_replies import FaultyChain, OneAsTheNext, OneElsewhere, SameAsTheNext
 
 ROBOT = RobotDescription.load("robot_description/open_manipulator_x")
 MS = 1_000_000
@@ -55,6 +56,49 @@ def test_a_rejected_position_moves_nothing_and_a_true_one_is_believed_at_once():
     assert made.jump.position == 3000
 
 
+@pytest.mark.parametrize("far", [400, 1500, -1900])
+def test_three_positions_in_a_row_that_agree_are_true_however_far_they_are(far):
+    made = watch()
+    accepted = []
+    for ms, position in (
+        (10, 2048 + far),
+        (11, 2048 + far + 300),
+        (12, 2048 + far),
+        (13, 2048 + far),
+        (14, 2048 + far),
+    ):
+        accepted.append(made.accepts(1, position, (ms * MS, ms * MS + MS), torque=True))
+    assert accepted == [False, False, False, False, True]
+
+
+@pytest.mark.parametrize(("apart", "speed"), [(20, 0.0), (45, 0.0), (455, 0.0), (130, 400.0), (455, 400.0)])
+@pytest.mark.parametrize(
+    ("faults", "timeout_ms"),
+    [
+        ({"damaged": 0.3, "foreign": 0.1}, 8),
+        ({"damaged": 0.3, "foreign": 0.1}, 80),
+        ({"lost": 0.3, "foreign": 0.2}, 20),
+    ],
+)
+def test_damaged_and_foreign_replies_give_no_joint_anothers_angle(speed, apart, faults, timeout_ms):
+    """Joints next to each other, at rest and turning to and fro; pulses and pulses per second."""
+    starts = {number: 1500.0 + apart * number for number in range(1, 6)}
+    chain = FaultyChain(dict(starts), WireFaults(), timeout_ms)
+    made = PositionWatch(dict.fromkeys(starts, XL430_W250))
+    made.read(chain, held=starts)
+    chain._faults = WireFaults(**faults, seed=apart)
+    worst, accepted = 0.0, 0
+    for _ in range(600):
+        for number, start in starts.items():
+            turned = 1e-9 * chain.now_ns * speed % 600.0
+            chain.positions[number] = start + (turned if turned < 300.0 else 600.0 - turned)
+        for number, one in made.read(chain, held=starts).items():
+            accepted += 1
+            worst = max(worst, abs(one.values["Present Position"] - chain.positions[number]))
+    assert worst <= NOISE + 1
+    assert accepted > 300
+
+
 def test_a_servo_that_stays_where_it_was_turned_is_believed_after_a_while():
     made = watch()
     assert [made.accepts(1, 2448, (ms * MS, (ms + 1) * MS), torque=True) for ms in (10, 40, 100)] == [
@@ -69,7 +113,7 @@ def test_the_first_position_of_all_is_believed_where_nobody_is_missing_or_two_ag
     told = []
     for ms, position in ((0, 2512), (10, 2048), (20, 2050), (30, 2049)):
         told.append(made.accepts(1, position, (ms * MS, (ms + 1) * MS), torque=False, complete=False))
-    assert told == [False, False, True, True]
+    assert told == [False, False, False, True]
     assert made.jump is None
 
 
@@ -154,6 +198,40 @@ def test_a_joint_that_jumps_is_a_fault_and_keeps_its_angle(emulator, port, still
     assert arm.fault_of_answers(arm.measured()) is None
     emulator.faults = OneElsewhere(12, 1900)
     assert [fault.code for fault in arm.check()] == ["joint_jumped"]
+
+
+def test_a_position_that_is_withheld_counts_as_a_lost_reply_and_stops_the_arm_as_one(emulator, port):
+    port.latency_s = 0.004
+    arm = ServoArm(joint_servos(ROBOT), ServoChain(port), 0.01)
+    while arm.measured() is None:
+        pass
+    before = arm.measured().counts
+    emulator.faults = SameAsTheNext(12)
+    codes = []
+    while "joint_silent" not in codes:
+        reading = arm.measured()
+        np.testing.assert_array_equal(reading.counts, before)
+        fault = arm.fault_of_answers(reading)
+        codes += [] if fault is None else [fault.code]
+    assert (reading.ages_s[[1, 2]] > 0.05).all()
+    assert (reading.ages_s[[0, 3, 4]] < reading.ages_s[1]).all()
+
+
+def test_ids_that_were_exchanged_while_it_is_disarmed_keep_the_arm_from_being_armed(emulator, port):
+    """Servos of one model, so that nothing else tells them apart; exchanged back, they are right."""
+    port.latency_s = 0.1
+    arm = ServoArm(joint_servos(ROBOT), ServoChain(port), 1.0)
+    while arm.measured() is None:
+        pass
+    for expected in (["servos_exchanged"], []):
+        with emulator.lock:
+            one, other = (emulator.bus.servos[index].memory for index in (1, 3))
+            one["ID"], other["ID"] = other["ID"], one["ID"]
+        for _ in range(4):
+            arm.measured()
+        faults = arm.check()
+        assert [fault.code for fault in faults] == expected
+        assert all("servo 12 (" in fault.detail and "servo 14 (" in fault.detail for fault in faults)
 
 
 def test_an_arm_is_not_held_where_another_servo_stands(emulator, port, still):

@@ -88,12 +88,18 @@ class ServoArm:
         chain: Of their bus.
         period_s: Of the loop that will read and command.
         timeouts: For servos and reads.
+        watch: Of their positions so far; None: it begins now.
 
     All methods raise PortLostError when the port went away.
     """
 
     def __init__(
-        self, servos: Sequence[JointServo], chain: ServoChain, period_s: float, timeouts: Timeouts | None = None
+        self,
+        servos: Sequence[JointServo],
+        chain: ServoChain,
+        period_s: float,
+        timeouts: Timeouts | None = None,
+        watch: PositionWatch | None = None,
     ) -> None:
         self.servos = tuple(servos)
         self.health = {servo.joint: ServoHealth() for servo in servos}
@@ -104,7 +110,7 @@ class ServoArm:
         self._turns = [0 for _ in servos]
         self._numbers = [servo.number for servo in servos]
         self._registers = servos[0].model.registers  # those used here have one address in all models
-        self._watch = PositionWatch({servo.number: servo.model for servo in servos})
+        self.watch = watch or PositionWatch({servo.number: servo.model for servo in servos})
         self._noise_mark = (0, 0)
         self._noise = ""
 
@@ -113,9 +119,9 @@ class ServoArm:
         faults = arming_faults(self.servos, self._chain)
         if faults:
             return faults
-        self._watch.jump = None
+        self.watch.jump = None
         fault = bus_fault(self.measured, self._timeouts.read_s or self._period_s, self._clock) or self._fault_of_jump()
-        return () if fault is None else (fault,)
+        return tuple(one for one in (fault, self._fault_of_exchanged()) if one is not None)
 
     def take_hold(self) -> tuple[Fault, ...]:
         """Torque on at the present positions, then the bus watchdog. Nothing moves: the goal is the present position.
@@ -163,9 +169,9 @@ class ServoArm:
         """Position of a servo, with the attempts of any read. Raises ServoError."""
         asked_ns = self._clock.now_ns
         position = self._chain.read(number, self._registers[POSITION])
-        self._watch.jump = None
-        if not self._watch.accepts(number, position, (asked_ns, self._clock.now_ns), torque=torque):
-            raise ServoError(number, f"servo {number} {self._watch.jump}: check cable, plugs and supply, and arm again")
+        self.watch.jump = None
+        if not self.watch.accepts(number, position, (asked_ns, self._clock.now_ns), torque=torque):
+            raise ServoError(number, f"servo {number} {self.watch.jump}: check cable, plugs and supply, and arm again")
         return position
 
     def let_go(self, torque_off: bool) -> tuple[str, ...]:
@@ -203,7 +209,7 @@ class ServoArm:
         """
         # One that has lost its torque has been rebooted, and may have begun in another turn.
         held = {one.number for one in self.servos if self.holds and self.health[one.joint].torque is not False}
-        answers = self._watch.read(self._chain, held) if self._chain.has_room() else {}
+        answers = self.watch.read(self._chain, held) if self._chain.has_room() else {}
         for servo in self.servos:
             if servo.number in answers:
                 self.health[servo.joint].answers = answers[servo.number]
@@ -225,7 +231,7 @@ class ServoArm:
 
     def fault_of_answers(self, reading: ArmReading) -> Fault | None:
         """A joint that jumped, joints without data for too long, or too many damaged exchanges."""
-        if self._watch.jump is not None:
+        if self.watch.jump is not None:
             return self._fault_of_jump()
         allowed_s = self._timeouts.silent_s
         missing = [self.servos[joint] for joint in np.flatnonzero(reading.ages_s > allowed_s)]
@@ -238,7 +244,7 @@ class ServoArm:
         return Fault("joint_silent", missing[0].joint if len(missing) == 1 else "", message)
 
     def _fault_of_jump(self) -> Fault | None:
-        jump, self._watch.jump = self._watch.jump, None
+        jump, self.watch.jump = self.watch.jump, None
         if jump is None:
             return None
         servo = self.servos[self._numbers.index(jump.number)]
@@ -247,6 +253,17 @@ class ServoArm:
             "ID, or another program talks on the bus"
         )
         return Fault("joint_jumped", servo.joint, message)
+
+    def _fault_of_exchanged(self) -> Fault | None:
+        exchanged = [servo for servo in self.servos if servo.number in self.watch.exchanged]
+        if not exchanged:
+            return None
+        names = " and ".join(map(str, exchanged))
+        message = (
+            f"{names} have exchanged their positions while the arm was disarmed: were their IDs exchanged? Move one "
+            "joint by hand and look which angle changes. Exchange them back; if they are right, start the driver again"
+        )
+        return Fault("servos_exchanged", exchanged[0].joint, message)
 
     def _fault_of_noise(self) -> Fault | None:
         counts = self._chain.counts

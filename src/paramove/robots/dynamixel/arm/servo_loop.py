@@ -292,7 +292,8 @@ class ServoLoop:
             self._reopen_s = self._now_s + REOPEN_S
             return
         self.lost = ""
-        self.arm = ServoArm(self._servos, ServoChain(self._port), self._period_s, self._settings.timeouts)
+        chain, timeouts = ServoChain(self._port), self._settings.timeouts
+        self.arm = ServoArm(self._servos, chain, self._period_s, timeouts, self.arm.watch)
 
     def _let_go(self, torque_off: bool) -> None:
         for failed in self.arm.let_go(torque_off):
