@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from paramove.bus import Bus, BusSettings, Tick, topics  # noqa: E402
-from paramove.dashboard import link_in  # noqa: E402
+from paramove.dashboard import Side, link_in, nonce, proof  # noqa: E402
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory  # noqa: E402
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState  # noqa: E402
 from paramove.robots import RobotDescription  # noqa: E402
@@ -88,11 +88,12 @@ class World:
         assert link is not None
         host = urlsplit(link).netloc
         with urlopen(link) as page:
-            cookie = page.headers["Set-Cookie"].partition(";")[0]
             key = page.read().decode().partition('name="paramove-key" content="')[2].partition('"')[0]
-        headers = {"Cookie": cookie}
-        url = f"ws://{host}/live?key={key}"
-        with connect(url, origin=Origin(f"http://{host}"), additional_headers=headers, compression=None) as live:
+        with connect(f"ws://{host}/live", origin=Origin(f"http://{host}"), compression=None) as live:
+            mine = nonce()
+            live.send(mine)
+            theirs, _ = str(live.recv()).split()
+            live.send(proof(key, Side.BROWSER, host, mine, theirs))
             live.recv()
             self.pressed_s = time.monotonic()
             live.send("stop")

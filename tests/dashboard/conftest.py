@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import socket
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,6 +13,7 @@ from urllib.parse import urlsplit
 import pytest
 from websockets.sync.client import ClientConnection, connect
 
+from paramove.dashboard.mutual_proof import Side, nonce, proof
 from paramove.dashboard.server import PageServer
 
 WAIT_S = 30.0
@@ -23,6 +26,7 @@ class Visitor:
     port: int
     cookie: str = ""
     key: str = ""
+    next_key: str = ""
 
     @property
     def host(self) -> str:
@@ -59,11 +63,29 @@ class Visitor:
         self.key = body.partition(b'name="paramove-key" content="')[2].partition(b'"')[0].decode()
         return body
 
-    def socket(self, **options: object) -> ClientConnection:
-        """Opens the socket as the page does."""
+    def unproved(self, **options: object) -> ClientConnection:
+        """Opens the socket as the page does; nothing is proved yet."""
         settings: dict[str, object] = {"origin": f"http://{self.host}", "additional_headers": {"Cookie": self.cookie}}
         settings |= {"compression": None, "proxy": None, "open_timeout": WAIT_S, "max_size": None}
-        return connect(f"ws://{self.host}/live?key={self.key}", **(settings | options))  # type: ignore[arg-type]
+        return connect(f"ws://{self.host}/live", **(settings | options))  # type: ignore[arg-type]
+
+    @contextlib.contextmanager
+    def socket(self, **options: object) -> Iterator[ClientConnection]:
+        """Opens the socket as the page does, and proves to have the key once the other side has."""
+        with self.unproved(**options) as live:
+            assert self.proves(live), "this is not the page"
+            self.next_key = json.loads(live.recv(WAIT_S))["next_key"]
+            yield live
+
+    def proves(self, live: ClientConnection) -> bool:
+        """Whether the other side proves to be the page; then this one proves itself."""
+        mine = nonce()
+        live.send(mine)
+        theirs, given = str(live.recv(WAIT_S)).split()
+        if given != proof(self.key, Side.PAGE, self.host, mine, theirs):
+            return False
+        live.send(proof(self.key, Side.BROWSER, self.host, mine, theirs))
+        return True
 
 
 @pytest.fixture

@@ -26,18 +26,18 @@ def test_the_link_opens_the_page_and_the_cookie_the_rest() -> None:
     assert judged("/?token=a-token", HOST) == Verdict(Kind.PAGE, by_token=True)
     assert judged("/", HOST, COOKIE) == Verdict(Kind.PAGE)
     assert judged("/page.js", HOST, COOKIE) == Verdict(Kind.FILE, file="page.js")
-    assert judged("/live?key=a-key", HOST, COOKIE, ORIGIN).kind is Kind.SOCKET
+    assert judged("/live", HOST, COOKIE, ORIGIN).kind is Kind.SOCKET
 
 
 def test_localhost_is_the_same_place_but_another_origin() -> None:
     local = ("Host", f"localhost:{PORT}")
-    assert judged("/live?key=a-key", local, COOKIE, ("Origin", f"http://localhost:{PORT}")).kind is Kind.SOCKET
-    assert judged("/live?key=a-key", local, COOKIE, ORIGIN).status is http.HTTPStatus.FORBIDDEN
+    assert judged("/live", local, COOKIE, ("Origin", f"http://localhost:{PORT}")).kind is Kind.SOCKET
+    assert judged("/live", local, COOKIE, ORIGIN).status is http.HTTPStatus.FORBIDDEN
 
 
 HOSTS = ["evil.example", f"evil.example:{PORT}", "127.0.0.1", "127.0.0.1:4712", f"127.0.0.1.evil.example:{PORT}", ""]
 HOSTS += [f"127.0.0.1:{PORT}@evil.example", f"[::1]:{PORT}", f"0.0.0.0:{PORT}", f"LOCALHOST.:{PORT}"]
-TARGETS = ["/", "/?token=a-token", "/page.js", "/live?key=a-key", "/nothing"]
+TARGETS = ["/", "/?token=a-token", "/page.js", "/live", "/nothing"]
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -59,25 +59,17 @@ ORIGINS += [f"http://127.0.0.1:{PORT}/", f"http://127.0.0.1:{PORT}.evil.example"
 
 @pytest.mark.parametrize("origin", ORIGINS)
 def test_a_foreign_origin_gets_no_socket(origin: str) -> None:
-    found = judged("/live?key=a-key", HOST, COOKIE, ("Origin", origin))
+    found = judged("/live", HOST, COOKIE, ("Origin", origin))
     assert (found.kind, found.status) == (Kind.REJECTED, http.HTTPStatus.FORBIDDEN)
 
 
 def test_a_missing_or_second_origin_gets_no_socket() -> None:
-    assert judged("/live?key=a-key", HOST, COOKIE).kind is Kind.REJECTED
-    assert judged("/live?key=a-key", HOST, COOKIE, ORIGIN, ("origin", "http://evil.example")).kind is Kind.REJECTED
-
-
-@pytest.mark.parametrize(
-    "target", ["/live", "/live?key=", "/live?key=wrong", "/live?key=a-token", "/live?key=a-session"]
-)
-def test_without_the_key_there_is_no_socket(target: str) -> None:
-    """Cookies are shared by all ports of a host: who was sent the cookie still has no key."""
-    assert judged(target, HOST, COOKIE, ORIGIN).status is http.HTTPStatus.FORBIDDEN
+    assert judged("/live", HOST, COOKIE).kind is Kind.REJECTED
+    assert judged("/live", HOST, COOKIE, ORIGIN, ("origin", "http://evil.example")).kind is Kind.REJECTED
 
 
 def test_a_page_whose_cookie_the_browser_dropped_still_gets_its_socket() -> None:
-    assert judged("/live?key=a-key", HOST, ORIGIN).kind is Kind.SOCKET
+    assert judged("/live", HOST, ORIGIN).kind is Kind.SOCKET
 
 
 COOKIES = [
@@ -92,7 +84,8 @@ COOKIES = [
 
 
 @pytest.mark.parametrize(
-    "target", ["/", "/page.js", "/live?key=wrong", "/nothing", "/?token=", "/?token=wrong", "/?token"]
+    "target",
+    ["/", "/page.js", "/nothing", "/?token=", "/?token=wrong", "/?token", "/?token=a-session", "/?token=a-key"],
 )
 @pytest.mark.parametrize("cookie", COOKIES)
 def test_without_a_session_everything_is_refused_alike(cookie: str, target: str) -> None:
@@ -120,7 +113,7 @@ def test_cookies_of_other_programs_on_this_host_change_nothing(cookie: str) -> N
     ):
         assert judged("/", HOST, *headers) == Verdict(Kind.PAGE)
         assert judged("/page.js", HOST, *headers).kind is Kind.FILE
-        assert judged("/live?key=a-key", HOST, ORIGIN, *headers).kind is Kind.SOCKET
+        assert judged("/live", HOST, ORIGIN, *headers).kind is Kind.SOCKET
     assert judged("/?token=a-token", HOST, ("Cookie", cookie)) == Verdict(Kind.PAGE, by_token=True)
     assert judged("/", HOST, ("Cookie", cookie)).status is http.HTTPStatus.FORBIDDEN
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import http.server
+import json
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from websockets.sync.server import ServerConnection, serve
 
 from paramove.bus import topics
 from paramove.dashboard.live_picture import LivePicture, Texts
@@ -316,6 +318,48 @@ def test_a_lost_connection_is_told_and_comes_back(run: Run, browser: Browser) ->
     run.comes_back()
     run.publish((topics.SPEECH, Speech(text="Here I am again.")))
     browser.until("document.getElementById('sentence').textContent === 'Here I am again.'", "it goes on by itself")
+    assert run.said, "the stop that was pressed meanwhile is sent now"
+
+
+class FalsePage:
+    """Another program at the port of a page that died: accepts sockets, keeps what it is sent, shows a state."""
+
+    def __init__(self, port: int) -> None:
+        self.received: list[str] = []
+        self._server = serve(self._attend, "127.0.0.1", port, compression=None)
+        self._thread = threading.Thread(target=self._server.serve_forever)
+
+    def _attend(self, connection: ServerConnection) -> None:
+        assert connection.request is not None
+        self.received += [connection.request.path, *map(str, connection.request.headers.raw_items())]
+        for answer in (f"{'0' * 32} {'0' * 64}", json.dumps({"next_key": "x"}), json.dumps({"clock": 754.0})):
+            self.received.append(str(connection.recv()))
+            connection.send(answer)
+
+    def __enter__(self) -> FalsePage:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._server.shutdown()
+        self._thread.join()
+
+
+def test_another_program_at_the_port_of_a_dead_page_gets_no_key_and_is_not_believed(run: Run, browser: Browser) -> None:
+    opened(browser, run)
+    key = str(browser.run("localStorage.getItem('paramove-key')"))
+    assert len(key) == 32
+    run.breaks()
+    with FalsePage(run.page.port) as false:
+        browser.until("document.getElementById('alert').textContent.includes('does not prove')", "the page tells it")
+        browser.click("#stop")
+        browser.until("document.getElementById('alert').textContent.includes('NOT confirmed')", "no stop is pretended")
+        browser.wait(lambda: len(false.received) > 40, "it tries again")
+        assert "754" not in browser.text()
+        assert key not in "".join(false.received)
+        assert "stop" not in false.received
+    run.comes_back()
+    browser.until("document.getElementById('gate-state').textContent === 'hold'", "the true page is believed")
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 800), (390, 844), (820, 1180)])

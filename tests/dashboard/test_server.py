@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import re
 import select
 import socket
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import psutil
@@ -15,10 +19,14 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
 from paramove.dashboard.link_file import NAME, link_in
-from paramove.dashboard.server import MAX_BROWSERS, MAX_CONNECTIONS, PageServer
+from paramove.dashboard.mutual_proof import Side, nonce, proof
+from paramove.dashboard.server import MAX_BROWSERS, PageServer
 from tests.dashboard.conftest import WAIT_S, Visitor
 
 MEGABYTE = 2**20
+NOBODY = 65534
+PROMPT_S = 0.25
+"""For a stop on a busy computer; without others it takes about a millisecond."""
 
 
 def pressed(page: PageServer) -> bool:
@@ -105,11 +113,15 @@ def test_cookies_of_other_ports_keep_nobody_from_the_page_and_its_stop(page: Pag
     cookies = f"{foreign}; {visitor.cookie}"
     for target in ("/", "/page.js"):
         assert visitor.get(target, Cookie=cookies)[0] == 200
-    head = f"GET /live?key={visitor.key} HTTP/1.1\r\nHost: {visitor.host}\r\nOrigin: http://{visitor.host}\r\n"
+    head = f"GET /live HTTP/1.1\r\nHost: {visitor.host}\r\nOrigin: http://{visitor.host}\r\n"
     head += f"Cookie: {cookies}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
     with socket.create_connection(("127.0.0.1", page.port), WAIT_S) as live:
         live.sendall(f"{head}Sec-WebSocket-Key: {'A' * 22}==\r\n\r\n".encode("latin-1"))
         assert b" 101 " in live.recv(65536)
+        mine = nonce()
+        live.sendall(b"\x81\xa0\0\0\0\0" + mine.encode())
+        theirs, _ = live.recv(65536)[2:].decode().split()
+        live.sendall(b"\x81\xc0\0\0\0\0" + proof(visitor.key, Side.BROWSER, visitor.host, mine, theirs).encode())
         live.sendall(b"\x81\x84\0\0\0\0stop")
         assert pressed(page)
 
@@ -127,11 +139,38 @@ def test_pages_on_two_ports_have_cookies_of_their_own(page: PageServer, visitor:
 
 def test_without_the_link_nothing_is_shown(page: PageServer) -> None:
     stranger = Visitor(page.port)
-    for target in ("/", "/page.js", "/live", "/live_page.json", "/../../etc/passwd", "/?token=", "/?token=x"):
+    for target in ("/", "/page.js", "/live_page.json", "/../../etc/passwd", "/?token=", "/?token=x"):
         status, _, body = stranger.get(target)
         assert status == 403
         assert b"script" not in body
-    assert status_of_socket(stranger) == 403
+    with stranger.unproved() as live:
+        stranger.proves(live)
+        live.send(proof("wrong", Side.BROWSER, stranger.host, "0" * 32, "0" * 32))
+        assert until_closed(live) == ([], 1008)
+    assert not page.watched
+
+
+@pytest.mark.parametrize("first", ["stop", "next", "", "0" * 31, "G" * 32, b"0" * 32])
+def test_nothing_is_said_to_who_does_not_begin_with_a_proof(page: PageServer, visitor: Visitor, first: str) -> None:
+    with visitor.unproved() as live:
+        live.send(first)
+        assert until_closed(live) == ([], 1008)
+    assert not page.was_pressed()
+    assert not page.watched
+
+
+def test_a_proof_is_good_for_one_connection_and_one_address(page: PageServer, visitor: Visitor) -> None:
+    mine = nonce()
+    with visitor.unproved() as first, visitor.unproved() as second:
+        for live in (first, second):
+            live.send(mine)
+        theirs, _ = str(first.recv(WAIT_S)).split()
+        second.recv(WAIT_S)
+        second.send(proof(visitor.key, Side.BROWSER, visitor.host, mine, theirs))
+        assert until_closed(second) == ([], 1008)
+        first.send(proof(visitor.key, Side.BROWSER, f"127.0.0.1:{page.port - 1}", mine, theirs))
+        assert until_closed(first) == ([], 1008)
+    assert not page.watched
 
 
 @pytest.mark.parametrize("target", ["/", "/page.js", "/live", "/nothing"])
@@ -144,7 +183,6 @@ def test_a_foreign_page_gets_no_socket(page: PageServer, visitor: Visitor) -> No
     for origin in ("http://evil.example", f"https://{visitor.host}", "http://127.0.0.1:1", "null"):
         assert status_of_socket(visitor, origin=origin) == 403
     assert status_of_socket(visitor, origin=None) == 403
-    assert status_of_socket(Visitor(visitor.port, visitor.cookie, "wrong")) == 403
     assert not page.watched
 
 
@@ -224,38 +262,86 @@ def test_many_browsers_are_limited_and_the_first_ones_served(page: PageServer, v
         opened = [stack.enter_context(visitor.socket()) for _ in range(MAX_BROWSERS)]
         for live in opened:
             live.recv(WAIT_S)
-        assert status_of_socket(visitor) == 503
+        with visitor.unproved() as live:
+            assert visitor.proves(live)
+            assert until_closed(live) == ([], 1013)
         opened[0].send("stop")
         assert pressed(page)
 
 
 def test_two_hundred_silent_connections_do_not_keep_a_browser_out(page: PageServer, visitor: Visitor) -> None:
-    """They are dropped at once beyond the limit, and the others when they have not asked for anything in time."""
-    with visitor.socket() as live:
-        idle = []
-        try:
-            for _ in range(200):
-                idle.append(socket.create_connection(("127.0.0.1", page.port), WAIT_S))
-            live.send("stop")
+    """The oldest give way, and the others are closed when they have not asked for anything in time."""
+    with visitor.socket() as live, contextlib.ExitStack() as stack:
+        idle = [socket.create_connection(("127.0.0.1", page.port), WAIT_S) for _ in range(200)]
+        for connection in idle:
+            stack.enter_context(connection)
+        live.send("stop")
+        assert pressed(page)
+        assert visitor.get("/")[0] == 200
+        with visitor.socket() as another:
+            another.send("stop")
             assert pressed(page)
-            dropped = 0
-            while dropped < 200 - MAX_CONNECTIONS:
-                readable = select.select(idle, [], [], WAIT_S)[0]
-                assert readable, "connections beyond the limit are dropped"
-                for connection in readable:
-                    idle.remove(connection)
-                    connection.close()
-                    dropped += 1
-            while idle:  # by the time limit
-                readable = select.select(idle, [], [], WAIT_S)[0]
-                assert readable, "a silent connection is closed in time"
-                for connection in readable:
-                    idle.remove(connection)
-                    connection.close()
+        while idle:
+            readable = select.select(idle, [], [], WAIT_S)[0]
+            assert readable, "a silent connection is closed in time"
+            idle = [connection for connection in idle if connection not in readable]
+
+
+HOSTILE = """
+import os, socket, sys
+"".encode("idna")  # loaded while this user may read it
+os.setgroups([])
+os.setuid(int(sys.argv[3]))
+port, manner = int(sys.argv[1]), sys.argv[2]
+REQUEST = f"GET /live HTTP/1.1\\r\\nHost: 127.0.0.1:{port}\\r\\nOrigin: http://127.0.0.1:{port}\\r\\n"
+SOCKET = "Connection: Upgrade\\r\\nUpgrade: websocket\\r\\nSec-WebSocket-Version: 13\\r\\n"
+SOCKET += "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\\r\\n\\r\\n"
+begun = {"silent": "", "slow": REQUEST, "unproved": REQUEST + SOCKET, "large": REQUEST + "X: " + "y" * 60000}[manner]
+kept, told = [], False
+while True:
+    try:
+        kept.append(socket.create_connection(("127.0.0.1", port), 5))
+        kept[-1].sendall(begun.encode())
+    except OSError:
+        pass
+    if manner == "slow" and kept:
+        for connection in kept[-20:]:
+            try:
+                connection.send(b"X")
+            except OSError:
+                pass
+    if len(kept) == 300 and not told:
+        told = True
+        print("begun", flush=True)
+    while len(kept) > 400:
+        kept.pop(0).close()
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
+@pytest.mark.parametrize("manner", ["silent", "slow", "unproved", "large"])
+def test_connections_of_another_user_keep_out_no_browser_and_delay_no_stop(
+    page: PageServer, visitor: Visitor, manner: str
+) -> None:
+    hostile = [sys.executable, "-c", HOSTILE, str(page.port), manner, str(NOBODY)]
+    with (
+        subprocess.Popen(hostile, stdout=subprocess.PIPE) as other,
+        visitor.socket() as live,
+    ):
+        try:
+            assert other.stdout is not None
+            assert other.stdout.readline() == b"begun\n"
+            for _ in range(10):
+                pressed_s = time.monotonic()
+                live.send("stop")
+                assert pressed(page)
+                assert time.monotonic() - pressed_s < PROMPT_S
+                assert visitor.get("/")[0] == 200
+                with visitor.socket() as another:
+                    another.send("stop")
+                    assert pressed(page)
         finally:
-            for connection in idle:
-                connection.close()
-    assert visitor.get("/")[0] == 200
+            other.kill()
 
 
 def test_a_browser_that_does_not_read_or_answer_costs_nothing(page: PageServer, visitor: Visitor) -> None:
@@ -308,15 +394,61 @@ def test_at_the_end_browsers_are_told_why(tmp_path: Path) -> None:
     assert not (tmp_path / NAME).exists()
 
 
-def test_a_page_that_failed_comes_back_where_it_was(tmp_path: Path) -> None:
-    with contextlib.suppress(RuntimeError), PageServer(tmp_path) as first:
+def failing(folder: Path) -> Visitor:
+    """A page fails; returns the browser that was connected to it."""
+    with contextlib.suppress(RuntimeError), PageServer(folder) as first:
         visitor = Visitor(first.port)
         visitor.open_link(first.link)
-        raise RuntimeError("a fault")
+        with visitor.socket():
+            raise RuntimeError("a fault")
+    return visitor
+
+
+def test_a_page_that_failed_comes_back_where_it_was_and_a_connected_browser_follows(tmp_path: Path) -> None:
+    visitor = failing(tmp_path)
     with PageServer(tmp_path) as second:
-        assert second.port == first.port
+        assert second.port == visitor.port
+        visitor.key = visitor.next_key
         with visitor.socket() as live:
             assert "beat" in json.loads(live.recv(WAIT_S))
+            live.send("stop")
+            assert pressed(second)
+        assert visitor.next_key != visitor.key
+
+
+def test_what_a_browser_had_of_a_page_ends_with_its_process(tmp_path: Path) -> None:
+    with contextlib.suppress(RuntimeError), PageServer(tmp_path) as first:
+        visitor, unused = Visitor(first.port), ""
+        visitor.open_link(first.link)
+        unused = first.link
+        raise RuntimeError("a fault")
+    with PageServer(tmp_path) as second:
+        assert second.port == visitor.port
+        assert visitor.get("/")[0] == 403
+        assert visitor.get(unused.partition(visitor.host)[2])[0] == 403
+        with visitor.unproved() as live:
+            assert not visitor.proves(live)
+        with visitor.unproved() as live:
+            mine = nonce()
+            live.send(mine)
+            theirs = str(live.recv(WAIT_S)).split()[0]
+            live.send(proof(visitor.key, Side.BROWSER, visitor.host, mine, theirs))
+            assert until_closed(live) == ([], 1008)
+
+
+def test_a_program_at_the_port_of_a_dead_page_cannot_relay_the_next_page(tmp_path: Path) -> None:
+    visitor = failing(tmp_path)
+    with socket.create_server(("127.0.0.1", visitor.port)), PageServer(tmp_path) as second:
+        assert second.port != visitor.port
+        visitor.key = visitor.next_key
+        relay = Visitor(second.port)
+        with relay.unproved() as live:
+            mine = nonce()
+            live.send(mine)
+            theirs, given = str(live.recv(WAIT_S)).split()
+            assert given != proof(visitor.key, Side.PAGE, visitor.host, mine, theirs), "the browser is at another port"
+            live.send(proof(visitor.key, Side.BROWSER, visitor.host, mine, theirs))
+            assert until_closed(live) == ([], 1008)
 
 
 def test_a_port_that_is_asked_for_and_taken_is_named(tmp_path: Path) -> None:

@@ -60,5 +60,6 @@ def test_a_page_that_is_followed_lets_browsers_wait(tmp_path):
     assert not any("ended" in json.loads(one) for one in messages)
     with PageServer(tmp_path) as second:
         assert second.port == first.port
+        visitor.key = visitor.next_key
         with visitor.socket() as again:
             assert "beat" in json.loads(again.recv(WAIT_S))

@@ -17,7 +17,7 @@ import typer
 from rich.console import Console
 
 from paramove.cli.set_up_view import FOLDER_VARIABLE, open_where_displayed
-from paramove.dashboard import NAME, link_in
+from paramove.dashboard import NAME, link_in, process_in
 from paramove.documents import DocumentError, InputError, exit_codes, printable
 from paramove.supervision import (
     DomainError,
@@ -239,6 +239,8 @@ def with_page(workspace: Workspace, name: str, overlays: Sequence[str] | None) -
 class AnnouncingView:
     """Another view that also prints the page's link as soon as there is one, and opens it where there is a display.
 
+    The link of a page that was restarted is printed, too: earlier ones have ended with its process.
+
     Args:
         view: Shows the run.
         run_folder: The page leaves its link there.
@@ -247,7 +249,7 @@ class AnnouncingView:
     def __init__(self, view: View, run_folder: Path) -> None:
         self._view = view
         self._run_folder = run_folder
-        self._link_printed = False
+        self._printed_of = 0
 
     @property
     def closed_by(self) -> signal.Signals | None:
@@ -268,10 +270,13 @@ class AnnouncingView:
 
     def refresh(self, nodes: Iterable[SupervisedNode]) -> None:
         """As the other view; looks for the link."""
-        if not self._link_printed and (link := link_in(self._run_folder)):
-            self._link_printed = True
+        process = process_in(self._run_folder)
+        if process not in (0, self._printed_of):
+            link = link_in(self._run_folder)
             self._view.story(f"live page: {link}")
-            open_where_displayed(link)
+            if not self._printed_of:  # an open page reconnects by itself
+                open_where_displayed(link)
+            self._printed_of = process
         self._view.refresh(nodes)
 
     def close(self) -> None:

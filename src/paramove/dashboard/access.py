@@ -6,9 +6,12 @@ request must
 1. be a GET for a host name of ours (against DNS rebinding: a foreign name that was made to point here),
 2. carry the link's token, good for one use, or the session cookie that it was exchanged for,
 3. name a route exactly; nothing is looked up in the file system, so there is no path to climb,
-4. for the socket, come from the page itself (`Origin` exactly ours) and carry the key that only the page was given.
-   A cookie does not count there: all ports of a host share their cookies and one limit of them, and a browser that
-   dropped ours for another program's must still be able to stop the arm.
+4. for the socket, come from the page itself (`Origin` exactly ours). What is sent there needs a proof of the key
+   (`mutual_proof.py`). A cookie does not count there: all ports of a host share their cookies and one limit of them,
+   and a browser that dropped ours for another program's must still be able to stop the arm.
+
+All secrets end with the process of the page. A browser sends the cookie to any program at any port of this host: it
+opens the page's files, which are public, but neither the key nor the socket.
 """
 
 from __future__ import annotations
@@ -53,7 +56,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Secrets:
-    """Random strings: the link's token, the session (cookie) and the key (for the socket)."""
+    """Random strings of one process: the link's token, the session (cookie) and the key (for the socket)."""
 
     token: str = field(repr=False)
     session: str = field(repr=False)
@@ -109,7 +112,7 @@ class Access:
         if path == PAGE and _same(parameters.get("token", [""])[0], self.secrets.token):
             return Verdict(Kind.PAGE, by_token=True)
         if path == SOCKET:
-            return self._socket(values, parameters.get("key", [""])[0])
+            return self._socket(values)
         if not self._has_session(values):
             return _rejected(FORBIDDEN, WITHOUT_LINK)
         if path == PAGE:
@@ -122,11 +125,8 @@ class Access:
         pairs = (one.strip().partition("=") for line in headers.get("cookie", ()) for one in line.split(";"))
         return any(name == self.cookie and _same(value, self.secrets.session) for name, _, value in pairs)
 
-    def _socket(self, headers: dict[str, list[str]], key: str) -> Verdict:
-        origins = headers.get("origin", [])
-        if not _same(key, self.secrets.key):
-            return _rejected(FORBIDDEN, WITHOUT_LINK)
-        if origins != [f"http://{headers['host'][0]}"]:
+    def _socket(self, headers: dict[str, list[str]]) -> Verdict:
+        if headers.get("origin", []) != [f"http://{headers['host'][0]}"]:
             return _rejected(FORBIDDEN, "Only the page itself may open the socket.")
         return Verdict(Kind.SOCKET)
 

@@ -3,7 +3,11 @@
 The bus's thread leaves the latest content with `show` and never waits. Each browser is sent the changes since its
 last message once it has sent "next", which means that it has drawn that message. So a slow one gets fewer pictures but
 no older ones, and nothing is queued, not even in the sockets. The only other message of a browser is "stop"; it makes
-`pressed` readable, which the bus's thread watches.
+`pressed` readable, which the bus's thread watches. Before that both sides prove that they have the key
+(`mutual_proof.py`).
+
+Other users of the machine can connect, too. Each round of the loop accepts few connections, and those that prove
+nothing are limited in number and time (`opening.py`), so that neither a new browser nor a stop waits for them.
 """
 
 from __future__ import annotations
@@ -23,13 +27,16 @@ from types import TracebackType
 from typing import Any
 
 from websockets import http11
-from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from paramove.dashboard.access import Access, Kind, Verdict
 from paramove.dashboard.link_file import LinkFile
+from paramove.dashboard.mutual_proof import Side, is_nonce, is_proof, nonce, proof
+from paramove.dashboard.opening import OpeningConnections, ScreenedSocket
+from paramove.dashboard.peer_user import PeerUsers
 
 _log = logging.getLogger(__name__)
 
@@ -38,10 +45,10 @@ http11.MAX_LINE_LENGTH, http11.MAX_NUM_HEADERS = 65536, 32
 all ports of this host, which are easily more than the library's 8192 bytes."""
 ADDRESS = "127.0.0.1"
 MAX_BROWSERS = 16
-MAX_CONNECTIONS = 64
-"""Open connections, including those without a request yet."""
 OPENING_S = 5.0
-"""Timeout for a request, and for reading the answer."""
+"""Timeout for a request, for reading the answer, and for the proof of a browser."""
+ACCEPTED_AT_ONCE, WAITING_CONNECTIONS = 8, 4096
+"""Connections that one round of the loop accepts; those that the kernel keeps for the next rounds."""
 SEND_PERIOD_S = 0.05
 HEARTBEAT_PERIOD_S = 1.0
 LOGGED_REJECTIONS = 20
@@ -69,13 +76,13 @@ class PageServer:
     def __init__(self, folder: Path, port: int = 0, *, followed: bool = False) -> None:
         self._followed = followed
         self._files = _read_files()
-        self._link_file = LinkFile.stored_or_new(folder, port)
+        self._link_file = LinkFile.following(folder, port)
         self._sections: dict[str, tuple[int, str]] = {}
         self._image: tuple[int, bytes] = (0, b"")
         self._version = 0
         self._updated_s = time.monotonic()
         self._browsers = 0
-        self._connections = 0
+        self._opening = OpeningConnections[_Connection](os.geteuid())
         self._rejections = 0
         self._farewell = "The run has ended."
         self._leaving = asyncio.Event()
@@ -143,7 +150,7 @@ class PageServer:
         self._loop.call_soon_threadsafe(self._leaving.set)
         self._thread.join()
         os.close(self.pressed)
-        if not stays:  # a page that follows has the same secrets
+        if not stays:  # a page that follows needs its key
             self._link_file.remove()
 
     def _run(self) -> None:
@@ -156,19 +163,23 @@ class PageServer:
                 self._started.set()
 
     async def _serve(self) -> None:
-        server = await self._listening()
-        self._link_file = self._link_file.at(server.sockets[0].getsockname()[1])
-        self._started.set()
-        await self._leaving.wait()
-        end_s = time.monotonic() + FAREWELL_TIMEOUT_S
-        while self._browsers and time.monotonic() < end_s:  # until the farewell is sent
-            await asyncio.sleep(SEND_PERIOD_S)
-        server.close()
-        await server.wait_closed()
+        listening = self._bound()
+        self._link_file = self._link_file.at(listening.getsockname()[1])
+        with PeerUsers() as self._peer_users:
+            server = await serve(self._attend, **self._options(listening))
+            listening.listen(WAITING_CONNECTIONS)  # asyncio has one number for this and for those accepted at once
+            self._started.set()
+            await self._leaving.wait()
+            end_s = time.monotonic() + FAREWELL_TIMEOUT_S
+            while self._browsers and time.monotonic() < end_s:  # until the farewell is sent
+                await asyncio.sleep(SEND_PERIOD_S)
+            server.close()
+            await server.wait_closed()
 
-    async def _listening(self) -> Server:
-        options: dict[str, Any] = {
-            "host": ADDRESS,
+    def _options(self, listening: ScreenedSocket) -> dict[str, Any]:
+        return {
+            "sock": listening,
+            "backlog": ACCEPTED_AT_ONCE,
             "process_request": self._answer,
             "create_connection": functools.partial(_Connection, self),
             "compression": None,
@@ -176,27 +187,29 @@ class PageServer:
             "close_timeout": 1.0,
             "ping_interval": 10.0,
             "ping_timeout": 30.0,
-            "max_size": 64,
+            "max_size": 64,  # a proof
             "max_queue": 4,
             "server_header": None,
             "logger": _quiet_logger(),
         }
+
+    def _bound(self) -> ScreenedSocket:
         try:
-            return await serve(self._attend, port=self._link_file.port, **options)
+            return ScreenedSocket((ADDRESS, self._link_file.port), self._admits)
         except OSError:
             if not self._link_file.path.exists():  # the port was chosen by the user
                 raise
             _log.warning("port %d of the page before is taken; another one is used", self._link_file.port)
-            return await serve(self._attend, port=0, **options)
+            return ScreenedSocket((ADDRESS, 0), self._admits)
+
+    def _admits(self, own: tuple[str, int], peer: tuple[str, int]) -> bool:
+        return self._opening.admits(self._peer_users.of(own, peer))
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Response with a file or a rejection; None opens the socket."""
         verdict = self._access.judge(request.method, request.path, request.headers.raw_items())
         if verdict.kind is Kind.SOCKET:
-            if self._browsers < MAX_BROWSERS:
-                return None
-            message = f"{MAX_BROWSERS} browsers are already connected; close one of them."
-            verdict = Verdict(Kind.REJECTED, http.HTTPStatus.SERVICE_UNAVAILABLE, message)
+            return None
         if verdict.kind is Kind.REJECTED:
             self._log_rejection(request, verdict)
             return self._response(verdict.status, "text/plain", verdict.detail.encode() + b"\n")
@@ -245,6 +258,13 @@ class PageServer:
 
     async def _attend(self, connection: ServerConnection) -> None:
         """Serves one browser until it disconnects."""
+        try:
+            async with asyncio.timeout(OPENING_S):
+                if not await self._proved(connection):
+                    return
+        except (ConnectionClosed, TimeoutError):
+            return
+        self._opening.remove(connection)  # type: ignore[arg-type]
         self._browsers += 1
         ready = asyncio.Event()
         ready.set()
@@ -256,6 +276,28 @@ class PageServer:
         finally:
             self._browsers -= 1
             listening.cancel()
+
+    async def _proved(self, connection: ServerConnection) -> bool:
+        """Proves to be the page with the key, and returns whether the browser proves that it has it, too.
+
+        Then the browser is given the key of the next process, which nobody else can ask for.
+        """
+        key, page_nonce = self._link_file.secrets.key, nonce()
+        browser_nonce = await connection.recv()
+        if not is_nonce(browser_nonce):
+            await connection.close(1008, "the first message is 32 hexadecimal digits")
+            return False
+        assert connection.request is not None
+        nonces = (connection.request.headers["Host"], str(browser_nonce), page_nonce)
+        await connection.send(f"{page_nonce} {proof(key, Side.PAGE, *nonces)}")
+        if not is_proof(await connection.recv(), proof(key, Side.BROWSER, *nonces)):
+            await connection.close(1008, "no proof of the key")
+            return False
+        if self._browsers >= MAX_BROWSERS:
+            await connection.close(1013, f"{MAX_BROWSERS} browsers are already connected; close one of them")
+            return False
+        await connection.send(json.dumps({"next_key": self._link_file.next_key}))
+        return True
 
     async def _listen(self, connection: ServerConnection, ready: asyncio.Event) -> None:
         try:
@@ -296,21 +338,21 @@ class PageServer:
 
 
 class _Connection(ServerConnection):
-    """A connection that is dropped at once if too many are open."""
+    """A connection that counts as opening, of its user, until the browser has proved itself."""
 
     def __init__(self, page: PageServer, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._page = page
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._page._connections += 1
         super().connection_made(transport)
-        if self._page._connections > MAX_CONNECTIONS:
-            assert isinstance(transport, asyncio.Transport)
-            transport.abort()
+        ends = transport.get_extra_info("sockname"), transport.get_extra_info("peername")
+        user = self._page._peer_users.of(*ends) if all(ends) else None
+        if (oldest := self._page._opening.add(self, user)) is not None:
+            oldest.transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self._page._connections -= 1
+        self._page._opening.remove(self)
         super().connection_lost(exc)
 
 

@@ -1,20 +1,22 @@
 // The live page: one socket, whose messages are put into the page as text, never as markup.
 import { CameraView } from "./camera.js";
 import { colourOf, css } from "./colours.js";
+import { nonce, proof } from "./proof.js";
 import { WorldView } from "./world.js";
 
 const $ = (id) => document.getElementById(id);
-const RETRY_MS = 1000, QUIET_S = 3, CONFIRM_MS = 1000, OLD_IMAGE_MS = 2000, NO_STATUS_S = 3;
+const RETRY_MS = 1000, QUIET_S = 3, CONFIRM_MS = 1000, OLD_IMAGE_MS = 2000, NO_STATUS_S = 3, PROOF_MS = 5000;
 
 const given = document.querySelector("meta[name=paramove-key]").content;
 if (given) localStorage.setItem("paramove-key", given);
-const key = given || localStorage.getItem("paramove-key") || "";
+let key = given || localStorage.getItem("paramove-key") || ""; // of the page's present process; useless after its end
+let nextKey = ""; // of the process that may follow; never stored, as a foreign program at this port could read it there
 history.replaceState(null, "", "/"); // the token is used up
 
 const state = {};
 const camera = new CameraView($("camera"));
 const world = new WorldView($("world"), $("labels"));
-let socket = null, image = null, connected = false, ended = "", quietS = 0, pressedAt = null, everConnected = false;
+let socket = null, image = null, connected = false, ended = "", quietS = 0, pressedAt = null, everConnected = false, foreign = false;
 
 function text(element, value) {
   if (element.textContent !== value) element.textContent = value;
@@ -160,6 +162,7 @@ function updateAlert() {
   let warning = "", calm = false;
   if (waited || (pressedAt !== null && !connected)) warning = "The stop is NOT confirmed. Use the robot's power switch.";
   else if (ended) [warning, calm] = [`The run has ended${/^The run has ended/.test(ended) ? "" : `: ${ended}`}. The page shows its last state.`, true];
+  else if (!connected && foreign) warning = "What answers here does not prove to be the page of this run: STOP does not reach the robot. Open the link that paramove launch --view printed last.";
   else if (!connected && everConnected && state.page?.robot === false) [warning, calm] = ["Waiting for the next step …", true];
   else if (!connected && everConnected) warning = "Connection lost: the page shows an old state, and STOP does not reach the robot. Trying again …";
   else if (!connected) warning = "Not connected. Open the link that paramove launch --view printed; it works once.";
@@ -182,17 +185,50 @@ function stop() {
 }
 
 function connect() {
-  const opened = new WebSocket(`ws://${location.host}/live?key=${encodeURIComponent(key)}`);
+  const opened = new WebSocket(`ws://${location.host}/live`);
   socket = opened;
   opened.binaryType = "arraybuffer";
-  opened.onopen = () => { connected = everConnected = true; ended = ""; updateAlert(); };
-  opened.onmessage = ({ data }) => take(data, opened);
+  opened.onopen = async () => {
+    setTimeout(() => { if (opened === socket && !connected) opened.close(); }, PROOF_MS);
+    foreign = !await proven(opened);
+    if (foreign) { opened.close(); return; }
+    opened.onmessage = ({ data }) => take(data, opened);
+    connected = everConnected = true;
+    ended = "";
+    if (pressedAt !== null) opened.send("stop");
+    updateAlert();
+  };
   opened.onclose = ({ code }) => {
+    if (code === 1001 && connected && !ended) ended = "The run has ended.";
     connected = false;
-    if (code === 1001 && !ended) ended = "The run has ended.";
     updateAlert();
     if (!ended) setTimeout(connect, RETRY_MS);
   };
+}
+
+// Whether the other side proves to be the page; then this side proves itself, too. Nothing is shown or sent before.
+async function proven(opened) {
+  const message = () => new Promise((done) => { opened.onmessage = ({ data }) => done(data); });
+  const mine = nonce();
+  let answer = message();
+  opened.send(mine);
+  const [theirs, given] = String(await answer).split(" ");
+  const keyOfPage = await keyFor(given, mine, theirs);
+  if (!keyOfPage) return false;
+  answer = message();
+  opened.send(await proof(keyOfPage, "browser", location.host, mine, theirs));
+  nextKey = JSON.parse(await answer).next_key;
+  key = keyOfPage;
+  localStorage.setItem("paramove-key", key);
+  return true;
+}
+
+// The key with which a page has proved itself: that of the process that gave it, or of the one that follows.
+async function keyFor(given, mine, theirs) {
+  for (const candidate of [key, nextKey]) {
+    if (candidate && given === await proof(candidate, "page", location.host, mine, theirs)) return candidate;
+  }
+  return "";
 }
 
 $("stop").addEventListener("click", stop);
