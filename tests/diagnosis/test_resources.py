@@ -33,11 +33,33 @@ def test_a_file_in_the_place_of_a_folder_is_told(tmp_path):
 
 
 @needs_root
-def test_a_folder_of_somebody_else_is_for_root_to_give(open_folder):
+def test_what_root_made_in_an_own_folder_is_for_root_to_give(open_folder):
+    os.chown(open_folder, NOBODY, NOBODY)
+    runs = open_folder / "runs"
+    runs.mkdir()
     code = "print(json.dumps(told(folder_finding('runs', Path(sys.argv[1])))))"
-    finding = as_nobody(folder_finding, code, open_folder)
+    finding = as_nobody(folder_finding, code, runs)
     assert (finding["level"], finding["fix"]) == ("problem", False)
-    assert finding["remedy"] == [f"sudo chown -R $USER {open_folder}"]
+    assert finding["remedy"] == [f"sudo chown -R {NOBODY} {runs}"]
+
+
+@needs_root
+def test_what_is_not_the_users_is_left_alone():
+    folders = ["/no_such/x", "/home", "/var/cache/paramove", "/dev/null", "/root/.cache/paramove"]
+    code = "found = [told(folder_finding(n, Path(f))) for n in ('cache', 'temporary', 'runs') for f in sys.argv[1:]]\n"
+    for finding in as_nobody(folder_finding, code + "print(json.dumps(found))", *folders):
+        assert (finding["level"], finding["fix"]) == ("problem", False)
+        (remedy,) = finding["remedy"]
+        assert not {"chown", "chmod", "mv", "sudo"} & set(remedy.split())
+        assert ("export" in remedy) != ("--runs" in remedy)
+
+
+@needs_root
+def test_a_link_to_a_folder_of_somebody_else_is_not_given_away(open_folder, short_folder):
+    os.chown(open_folder, NOBODY, NOBODY)
+    (open_folder / "cache").symlink_to("/var/cache")
+    code = "print(json.dumps(told(folder_finding('cache', Path(sys.argv[1])))))"
+    assert "chown" not in as_nobody(folder_finding, code, open_folder / "cache")["remedy"][0]
 
 
 @needs_root

@@ -89,6 +89,21 @@ def test_where_the_code_lies_read_only_the_users_cache_has_the_machine_code(fold
     assert list((folder / "cache").rglob("kernel_file.*.nbc"))
 
 
+def test_where_nothing_can_be_written_kernels_are_compiled_without_being_stored(folder):
+    """A user without home in a container; root may write everywhere, so that files stand where folders would be."""
+    (folder / "__pycache__").write_text("no folder can be made here")
+    (folder / "cache").write_text("nor here")
+    (folder / "kernel_file.py").write_text(KERNEL + KERNEL.partition("compiled\n\n")[2].replace("kernel", "another"))
+    both = "from kernel_file import another\nanother(1)\n"
+    for _ in range(2):
+        process = started(folder, "1", "1.5", program=both + PROGRAM)
+        output, said = process.communicate(timeout=300)
+        assert process.returncode == 0, said
+        assert output.split() == ["10", "15.0"]
+        assert said.count("NUMBA_CACHE_DIR") == 1
+    assert not list(folder.rglob("*.nbc"))
+
+
 def test_a_process_whose_code_was_edited_meanwhile_leaves_nothing_to_others(folder):
     """It may have imported either."""
     edited = "import paramove.source_code, pathlib; file = pathlib.Path('kernel_file.py'); "

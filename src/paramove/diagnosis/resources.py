@@ -50,24 +50,35 @@ def folder_finding(name: str, folder: Path) -> Finding:
     there = _nearest(folder)
     if there.is_dir() and os.access(there, os.W_OK | os.X_OK):
         return Finding(subject, Level.OK, f"{folder} can be written", facts=facts)
-    if not there.is_dir():
-        return Finding(
-            subject,
-            Level.PROBLEM,
-            f"{there} is no folder",
-            (shlex.join(["mv", str(there), f"{there}.old"]),),
-            facts=facts,
-        )
-    message = f"{there} cannot be written by this user"
     status = there.stat()
+    if not there.is_dir():
+        message = f"{there} is no folder"
+        own = there.is_file() and _is_in_own_folder(there)
+        remedy = shlex.join(["mv", str(there), f"{there}.old"]) if own else _another(name)
+        return Finding(subject, Level.PROBLEM, message, (remedy,), facts=facts)
+    message = f"{there} cannot be written by this user"
     if status.st_uid == os.geteuid():
         mode = stat.S_IMODE(status.st_mode) | stat.S_IRWXU
         command = shlex.join(["chmod", "u+rwx", str(there)])
         fix = Fix(f"run {command}", partial(there.chmod, mode))
         return Finding(subject, Level.PROBLEM, message, (command,), fix, facts)
-    return Finding(
-        subject, Level.PROBLEM, message, (as_root(f"chown -R $USER {shlex.quote(str(there))}"),), facts=facts
-    )
+    own = there == folder and _is_in_own_folder(there)  # made by this user's command as root, such as by sudo
+    remedy = as_root(f"chown -R {os.geteuid()} {shlex.quote(str(there))}") if own else _another(name)
+    return Finding(subject, Level.PROBLEM, message, (remedy,), facts=facts)
+
+
+def _is_in_own_folder(path: Path) -> bool:
+    """Whether it is no link and lies in a folder of this user, so that this user's programs made it."""
+    return not path.is_symlink() and path.parent.stat().st_uid == os.geteuid()
+
+
+def _another(name: str) -> str:
+    """How to use another folder, where the present one is not this user's to change."""
+    folder = shlex.quote(str(Path(tempfile.gettempdir()) / f"paramove-{os.geteuid()}"))
+    if name == "runs":
+        return "change into a folder of yours, or name one: paramove launch NAME --runs FOLDER"
+    variable = "TMPDIR" if name == "temporary" else "XDG_CACHE_HOME"
+    return f"mkdir -m 700 -p {folder} && export {variable}={folder}"
 
 
 def sockets_finding() -> Finding:
@@ -141,4 +152,4 @@ def environment_findings(workspace: Path) -> Iterator[Finding]:
 
 def _nearest(folder: Path) -> Path:
     """The folder, or the nearest above it that exists."""
-    return next((one for one in (folder, *folder.parents) if one.exists()), Path("/"))
+    return next((one for one in (folder, *folder.parents) if os.path.exists(one)), Path("/"))

@@ -3,7 +3,7 @@
 Machine code is stored next to the source, or in the user's cache folder where that cannot be written. numba looks only
 at the file of a kernel to see whether its machine code is stale, not at kernels of others that were compiled into it,
 and its index loses entries when several processes write it. So a digest of all inputs is in the name
-of each file here.
+of each file here. Where neither folder can be written, each process compiles the kernels that it needs.
 """
 
 import hashlib
@@ -28,7 +28,11 @@ logger = logging.getLogger(__name__)
 def dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """What numba makes of a function: it chooses among its machine code by the types of arguments."""
     compiled = numba.njit(nogil=True, **options)(function)
-    stored = FunctionCache(function)
+    try:
+        stored = FunctionCache(function)
+    except RuntimeError:  # there is no folder that can be written
+        _announce_unstored()
+        return compiled
     stored._cache_file = KernelFiles(stored.cache_path, stored._impl.filename_base, code_digest(function.__module__))
     compiled._cache = stored
     return compiled
@@ -59,6 +63,16 @@ class KernelFiles(IndexDataCacheFile):
     def _file_for(self, key: object) -> str:
         digest = hashlib.sha256(f"{key}, {LIBRARIES}".encode()).hexdigest()[:16]
         return str(self._data_name_pattern.format(number=0)).replace(".0.nbc", f".{self._source_stamp}.{digest}.nbc")
+
+
+@cache
+def _announce_unstored() -> None:
+    """Logs once, and not in every process of a pool."""
+    if parent_process() is None:
+        logger.warning(
+            "numerical kernels are compiled again in every process, seconds to two minutes: their machine code cannot "
+            "be stored; set NUMBA_CACHE_DIR to a folder that can be written"
+        )
 
 
 @cache

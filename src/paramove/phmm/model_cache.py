@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +22,7 @@ logger = logging.getLogger(__name__)
 
 def stored_model(kind: type[Model], path: Path | None) -> Model | None:
     """The model of a file, if it exists and can be read; logs why it cannot."""
-    if path is None or not path.exists():
+    if path is None or not os.path.exists(path):
         return None
     try:
         return kind.load(path)

@@ -105,7 +105,7 @@ def _ignored_folder(variables: Mapping[str, str], name: str, instead: str) -> It
 
 def _cache_folder(variables: Mapping[str, str]) -> Iterator[str]:
     cache = user_cache_path("paramove")
-    there = next((folder for folder in (cache, *cache.parents) if folder.exists()), Path("/"))
+    there = next((folder for folder in (cache, *cache.parents) if os.path.exists(folder)), Path("/"))
     home = variables.get("HOME", "")
     if home and not os.path.isabs(home):
         yield f"HOME={home!r} is ignored: it is not an absolute path; the cache is {cache}. Correct it"
