@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Generic, TypeVar
 
 OWN, EACH, OTHERS = 64, 8, 32
@@ -32,6 +32,9 @@ class OpeningConnections(Generic[Connection]):
 
     def __len__(self) -> int:
         return len(self._users)
+
+    def __iter__(self) -> Iterator[Connection]:
+        return iter(list(self._users))
 
     def admits(self, user: int | None) -> bool:
         """Whether this user may have one more; None: unknown."""

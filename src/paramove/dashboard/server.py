@@ -175,6 +175,9 @@ class PageServer:
                 await asyncio.sleep(SEND_PERIOD_S)
             server.close()
             await server.wait_closed()
+            for connection in self._opening:  # admitted in the last round
+                connection.transport.abort()
+            await asyncio.sleep(SEND_PERIOD_S)
 
     def _options(self, listening: ScreenedSocket) -> dict[str, Any]:
         return {
@@ -203,7 +206,7 @@ class PageServer:
             return ScreenedSocket((ADDRESS, 0), self._admits)
 
     def _admits(self, own: tuple[str, int], peer: tuple[str, int]) -> bool:
-        return self._opening.admits(self._peer_users.of(own, peer))
+        return not self._leaving.is_set() and self._opening.admits(self._peer_users.of(own, peer))
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Response with a file or a rejection; None opens the socket."""
