@@ -33,7 +33,9 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the robot then comes to rest by the stop ramp that it already has."""
     launch = ThisLaunch.of(bus.settings)
     robot, no_program = RobotDescription.load(config.robot), lambda: launch.why_no_program(bus.settings)
-    driver = ArmDriver(robot, no_program=no_program, link_timeout_s=config.link_timeout_s)
+    timeout_s, in_slices = config.link_timeout_s, not bus.settings.lockstep
+    driver = ArmDriver(robot, no_program=no_program, link_timeout_s=timeout_s, checks_in_slices=in_slices)
+    bus.when_idle(driver.check_on)
     handle = command_handlers(driver)
     handle[topics.WIRE_HOAP3_STATE] = lambda it: driver.on_robot_state(state_of(it.message), it.captured_ns)
     bus.ready(driver.detail)

@@ -31,8 +31,9 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the arm then comes to rest."""
     launch = ThisLaunch.of(bus.settings)
     paced_in = bus.settings.folder if bus.settings.lockstep else None
-    with config.driven_arm(bus.run_folder, launch, paced_in) as arm:
+    with config.driven_arm(bus.run_folder, launch, paced_in, checks_in_slices=paced_in is None) as arm:
         bus.when_readable(arm.readable, lambda: publish_all(bus, arm))
+        bus.when_idle(arm.check_on)
         bus.ready(arm.detail)
         handle = command_handlers(arm)
         for event in bus.events(*SUBSCRIBES, tick=True):

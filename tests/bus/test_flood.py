@@ -21,6 +21,7 @@ from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Subscriber
 from paramove.bus.ticks import Tick
 from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.tracked_objects_pb2 import TrackedObjects
 from tests.bus.conftest import RawPublisher, Wait
 
@@ -135,3 +136,65 @@ def test_a_listener_under_a_flood_still_has_ticks_other_messages_and_a_status(
         flooder.kill()
         assert flooded.messages + flooded.rejected.total() > 1000
         assert bool(flooded.rejected[Reason.BUDGET]) == (topic is topics.OBJECTS_TRACKED)
+
+
+def test_a_publisher_of_commands_that_floods_is_cut_off_and_named_and_may_come_back(
+    context: Context, folder: Path, wait: Wait, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the subscriber's own clock, whatever the stamps say; a status names it, other topics arrive."""
+    monkeypatch.setattr("paramove.bus.subscriber.CUT_OFF_S", 1.0)
+    publisher = Publisher(context, folder, topics.ARM_TRAJECTORY, "wild")
+    with Bus("driver", BusSettings(folder=folder), (topics.ARM_TRAJECTORY,)) as bus:
+        subscriber = bus.exchange.subscribers["arm/trajectory"]
+        bus.ready("as always")
+        wait(lambda: subscriber.welcomed, publisher.serve, lambda: bus.exchange.wait(0))
+        said = iter(range(10**9))
+
+        def flood() -> None:
+            stamp_ns = next(said) * SECOND_NS
+            publisher.publish(JointTrajectory(id=str(stamp_ns)), stamp_ns, stamp_ns)
+            bus.exchange.drain(["arm/trajectory"])
+
+        wait(lambda: subscriber.cut_off, flood)
+        assert f"pid {os.getpid()} (wild)" in subscriber.cut_off
+        assert len(bus.exchange.take(["arm/trajectory"])) <= BURST + 2
+        assert subscriber.counter.rejected[Reason.BUDGET] >= BURST
+        before = subscriber.counter.messages + subscriber.counter.rejected.total()
+        status = Subscriber(context, folder, topics.status("driver"))
+        wait(lambda: (found := status.receive()) and "(wild)" in found.message.detail, lambda: bus.exchange.wait(0.01))
+        for _ in range(100):
+            flood()
+        assert subscriber.counter.messages + subscriber.counter.rejected.total() == before
+        wait(lambda: not subscriber.cut_off, lambda: bus.exchange.wait(0.01))
+        wait(lambda: subscriber.counter.lost >= 100, publisher.serve, lambda: bus.exchange.wait(0.01))
+
+
+def test_a_stop_overtakes_what_waits_and_what_is_handed_out(context: Context, folder: Path, wait: Wait) -> None:
+    """Its stamp is the latest of all; it comes before other urgent messages, too."""
+    names = ("arm/trajectory", "operator/arm", "operator/stop")
+    publishers = {name: Publisher(context, folder, topics.by_name(name), "all") for name in names}
+    subscribed = [topics.by_name(name) for name in names]
+    with Bus("driver", BusSettings(folder=folder), subscribed) as bus:
+        wait(
+            lambda: all(one.welcomed for one in bus.exchange.subscribers.values()),
+            *(one.serve for one in publishers.values()),
+            lambda: bus.exchange.wait(0),
+        )
+        stamps = iter(range(1, 100))
+
+        def say(name: str) -> None:
+            stamp_ns = next(stamps)
+            publishers[name].publish(topics.by_name(name).type(), stamp_ns, stamp_ns)
+
+        for name in ("arm/trajectory", "arm/trajectory", "operator/arm", "operator/stop"):
+            say(name)
+        wait(lambda: all(one.socket.poll(0) for one in bus.exchange.subscribers.values()))
+        found = []
+        for event in bus.events():
+            found.append(event.topic.name)
+            if found == ["operator/stop", "operator/arm", "arm/trajectory"]:
+                say("operator/stop")
+                wait(lambda: bus.exchange.subscribers["operator/stop"].socket.poll(0))
+            if len(found) == 5:
+                break
+    assert found == ["operator/stop", "operator/arm", "arm/trajectory", "operator/stop", "arm/trajectory"]

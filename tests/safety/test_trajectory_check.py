@@ -8,7 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.safety_steps import limits_at
-from paramove.safety.trajectory_check import CheckedPath, TrajectoryRejectedError, check_trajectory
+from paramove.safety.trajectory_check import (
+    MAX_POINTS,
+    CheckedPath,
+    TrajectoryRejectedError,
+    check_in_slices,
+    check_trajectory,
+)
 from tests.robots.hoap3.movements import HOAP3
 
 LIMITS = HOAP3.motion_limits
@@ -252,3 +258,41 @@ def test_whatever_passes_keeps_every_limit(gaps: list[float], moves: list[float]
     assert (rows <= LIMITS.upper).all()
     assert (np.abs(np.diff(rows, axis=0)) <= LIMITS.velocity * 1e-3 * 1.01).all()
     assert (np.abs(rows[8:] - 2 * rows[4:-4] + rows[:-8]) <= LIMITS.acceleration * 16e-6 * 1.01).all()
+
+
+def test_a_long_movement_is_checked_in_many_slices() -> None:
+    times, offsets = rise(0.005, 100.0, -60.0)
+    points = START + np.deg2rad(offsets)
+    checking = check_in_slices(JOINTS, times, points.tolist(), HOAP3.base_pose, LIMITS, 0.1)
+    slices = 0
+    while True:
+        try:
+            next(checking)
+        except StopIteration as end:
+            path = end.value
+            break
+        slices += 1
+    assert slices > 300  # 100 001 rows, 1000 at once, in three passes
+    whole = check_trajectory(JOINTS, times, points.tolist(), HOAP3.base_pose, LIMITS, 0.1)
+    np.testing.assert_array_equal(path.rows, whole.rows)
+
+
+@pytest.mark.parametrize("jump_first", [False, True])
+def test_of_several_violations_the_first_rule_is_named_wherever_it_is_broken(jump_first: bool) -> None:
+    """A jump comes before a velocity in the gate's order, in whichever slice of the rows each is."""
+    times = np.arange(0.0, 6.0, 0.001)
+    offsets = np.zeros((len(times), 2))
+    jump, fast = (1000, 4500) if jump_first else (4500, 1000)
+    offsets[jump:, 0] -= np.deg2rad(40.0)
+    speed = 1.2 * LIMITS.velocity[PLACES[1]]
+    offsets[:, 1] += np.clip((times - times[fast]) * speed, 0.0, 0.1)
+    with pytest.raises(TrajectoryRejectedError) as raised:
+        check_trajectory(JOINTS, times, (START + offsets).tolist(), HOAP3.base_pose, LIMITS, 0.1)
+    assert (raised.value.code, raised.value.joint) == ("jump", JOINTS[0])
+    assert abs(raised.value.index - jump) <= 1
+
+
+def test_more_points_than_a_movement_can_need_are_rejected_by_their_number() -> None:
+    with pytest.raises(TrajectoryRejectedError) as raised:
+        check_trajectory(JOINTS, range(MAX_POINTS + 1), [[np.nan, 0.0]] * (MAX_POINTS + 1), START, LIMITS, 0.1)
+    assert raised.value.code == "points"

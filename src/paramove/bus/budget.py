@@ -1,15 +1,24 @@
 """How fast a topic may come.
 
 A publisher gone wild must not take its subscribers' time. Time is read from the messages' own stamps, on the bus clock:
-so a subscriber that was busy for a while, or simulated time that runs fast, breaks no budget.
+so a subscriber that was busy for a while, or simulated time that runs fast, breaks no budget. Commands are limited by
+the subscriber's own clock as well, for stamps may be wrong, and whoever goes on in spite of that is cut off.
 """
 
 from __future__ import annotations
+
+import time
 
 ALLOWANCE = 1.2
 """Times the topic's nominal rate."""
 BURST = 20
 """Messages beyond that at once."""
+
+
+CUT_OFF_S = 10.0
+"""How long a publisher that floods is cut off."""
+PAUSE_NS = 1_000_000_000
+"""Without excess for so long, a publisher starts anew."""
 
 
 class RateBudget:
@@ -39,3 +48,38 @@ class RateBudget:
             return False
         self._level += 1
         return True
+
+
+class FloodGuard:
+    """Limits the messages of a topic by this process's own clock, whatever stamps they carry.
+
+    Args:
+        rate_hz: Limit of the topic; None: all are admitted.
+
+    Attributes:
+        excess: Messages beyond the limit without a pause of a second between them.
+    """
+
+    def __init__(self, rate_hz: float | None) -> None:
+        self._budget = RateBudget(rate_hz)
+        self._latest_excess_ns = 0
+        self.excess = 0
+
+    @property
+    def floods(self) -> bool:
+        """Whether the publisher goes on so far beyond the limit that it is to be cut off."""
+        return self.excess >= BURST
+
+    def admits(self) -> bool:
+        """Whether a message that has just arrived is within the limit."""
+        now_ns = time.monotonic_ns()
+        if self._budget.admits(0, now_ns):
+            return True
+        paused = now_ns - self._latest_excess_ns > PAUSE_NS
+        self.excess = 1 if paused else self.excess + 1
+        self._latest_excess_ns = now_ns
+        return False
+
+    def reset(self) -> None:
+        """Starts anew, once a publisher is no longer cut off."""
+        self.excess = 0

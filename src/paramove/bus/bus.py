@@ -123,6 +123,14 @@ class Bus:
         """
         self.exchange.when_readable(descriptor, call)
 
+    def when_idle(self, work: Callable[[], bool]) -> None:
+        """Calls `work`, in the bus's thread, while no message waits and no tick is due, as long as it returns True.
+
+        For work that takes long: it is done in slices of a few milliseconds, between which messages and ticks are
+        handed out, urgent ones first. Not in lockstep, where time waits for a node.
+        """
+        self.exchange.idle_work = work
+
     def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
         """Publishes `message`. Never waits.
 
@@ -331,6 +339,8 @@ class Bus:
 
     def _next_of(self, names: set[str], conflate: bool) -> Received | None:
         """Takes the oldest message of these topics out of the backlog; with `conflate` also all others of its topic."""
+        if self._backlog and not self._backlog[0].topic.is_urgent:
+            self._backlog[:0] = self.exchange.take_urgent()
         for index, received in enumerate(self._backlog):
             if received.topic.name not in names:
                 continue

@@ -15,7 +15,7 @@ import zmq
 
 from paramove.bus.connecting import running_nodes, written
 from paramove.bus.endpoint import Ownership
-from paramove.bus.monitor import ForeignConnections
+from paramove.bus.monitor import ForeignConnections, can_read
 from paramove.bus.publisher import Publisher
 from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Received, Subscriber
@@ -30,6 +30,8 @@ WATCH_PERIOD_S = 0.25
 _CONNECT_PERIOD_S = 0.05
 DRAIN_LIMIT = 1000
 """Messages taken from one topic at once, so that a flood on it does not block the process."""
+URGENT_LIMIT = 20
+"""The same for an urgent topic, between any two other messages."""
 
 
 class Exchange:
@@ -46,6 +48,13 @@ class Exchange:
         self.publishers: dict[str, Publisher] = {}
         self.subscribers: dict[str, Subscriber] = {}
         self.every_second: Callable[[], None] = lambda: None
+        self.idle_work: Callable[[], bool] = lambda: False
+        """A slice of work that may wait for everything else; returns whether there is more."""
+        self.urgent_first = False
+        """Whether urgent topics overtake all others; not in lockstep, where the order of messages is the same in every
+        run."""
+        self._urgent: list[str] = []
+        self._only_urgent = False
         self.context: zmq.Context[Any] = zmq.Context()
         self._owned: list[Ownership] = []
         self._pending: dict[str, deque[tuple[int, Received]]] = {}
@@ -78,8 +87,17 @@ class Exchange:
         """Subscribes to a topic; to do it again changes nothing."""
         if topic.name not in self.subscribers:
             settings = self.settings
-            subscriber = Subscriber(self.context, settings.folder_of(topic), topic, settings.name_of(topic), self.node)
+            subscriber = Subscriber(
+                self.context,
+                settings.folder_of(topic),
+                topic,
+                settings.name_of(topic),
+                self.node,
+                by_own_clock=not settings.lockstep,
+            )
             self.subscribers[topic.name] = subscriber
+            if topic.is_urgent:
+                self._urgent = sorted([*self._urgent, topic.name], key=self._rank)
             self._pending[topic.name] = deque()
             self._poller.register(subscriber.socket, zmq.POLLIN)
             self._write_topics()
@@ -169,12 +187,15 @@ class Exchange:
     def wait(self, timeout_s: float) -> set[object]:
         """Waits until something can be read, at most `timeout_s`.
 
-        Drains what can be read of the subscribed topics and answers subscriptions.
+        Drains what can be read of the subscribed topics and answers subscriptions. Before, a slice of `idle_work` is
+        done, and as long as there is more of it, there is no wait.
 
         Returns:
             The sockets and descriptors that could be read.
         """
         self.housekeeping()
+        if self.idle_work():
+            timeout_s = 0.0
         until_due_s = min(self._watch_due_s, self._second_due_s) - time.monotonic()
         events = self._poller.poll(math.ceil(1000 * max(0.0, min(timeout_s, until_due_s))))
         ready: set[object] = {item for item, _ in events}
@@ -188,20 +209,60 @@ class Exchange:
                     call()
         return ready
 
-    def drain(self, topics: Iterable[str], ready: bool = False) -> None:
+    def drain(self, topics: Iterable[str], ready: bool = False, limit: int = DRAIN_LIMIT) -> None:
         """Takes what has arrived of these topics out of the sockets, without waiting.
+
+        With `urgent_first` it ends as soon as an urgent message waits: to decode a long one takes time.
 
         Args:
             topics: Names of subscribed topics.
             ready: A poll has shown that each of them has a message.
+            limit: Messages of each topic.
         """
         for name in topics:
             subscriber, pending = self.subscribers[name], self._pending[name]
-            for number in range(DRAIN_LIMIT):
+            for number in range(limit):
                 received = subscriber.receive(ready and number == 0)
                 if received is None:
                     break
                 pending.append((subscriber.counter.epoch or 0, received))
+                if self.urgent_first and not received.topic.is_urgent and self._urgent_waits():
+                    return
+
+    def take_urgent(self) -> list[Received]:
+        """What has arrived of the urgent topics: stops first, each topic in order of arrival.
+
+        Empty unless `urgent_first`. Costs little while nothing waits, so it may be called between any two messages. It
+        takes a few of each topic, so that a flood of them does not keep the process from its ticks.
+        """
+        if not self.urgent_first:
+            return []
+        taken: list[Received] = []
+        for name in self._urgent:
+            subscriber, pending = self.subscribers[name], self._pending[name]
+            if not pending and can_read(subscriber.socket):
+                self.drain([name], ready=True, limit=URGENT_LIMIT)
+            taken += [received for _, received in pending]
+            pending.clear()
+        return taken
+
+    def take_next(self, topics: list[str]) -> list[Received]:
+        """What has arrived, without waiting: of the urgent topics alone where there is something.
+
+        Of the others at least every second time, so that a flood of urgent messages does not keep them away for good.
+        """
+        messages = self.take_urgent()
+        self._only_urgent = bool(messages) and not self._only_urgent
+        if not self._only_urgent:
+            self.drain(topics)
+            messages += self.take(topics)
+        return messages
+
+    def _urgent_waits(self) -> bool:
+        return any(can_read(self.subscribers[name].socket) for name in self._urgent)
+
+    def _rank(self, name: str) -> bool:
+        return not self.subscribers[name].topic.is_stop
 
     def take(self, topics: Iterable[str], marks: Marks | None = None) -> list[Received]:
         """What was drained of these topics, in the order of publish time, then of the topics.

@@ -72,6 +72,7 @@ class RecordedBus:
         self._protected = protected
         self._waiting = list(recorded)
         self._sequences: Counter[str] = Counter()
+        self._idle_work: Callable[[], bool] = lambda: False
 
     def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
         """Stores a copy of the message; raises TypeError if the topic carries another type."""
@@ -115,6 +116,10 @@ class RecordedBus:
     def when_readable(self, descriptor: int, call: Callable[[], None]) -> None:
         """There is nothing to wait for in a recording; messages of another thread are fetched at ticks."""
 
+    def when_idle(self, work: Callable[[], bool]) -> None:
+        """A recording always waits: the work is done whole before its next message or tick is handed out."""
+        self._idle_work = work
+
     def starting(self, message: str) -> None:
         """Stores the state."""
         self._change("starting", message)
@@ -141,7 +146,7 @@ class RecordedBus:
 
     def hands_out(self, received: Received) -> bool:
         """Whether the node gets a message."""
-        checked = self._protected and not received.topic.is_request
+        checked = self._protected and received.topic.has_checked_numbers
         reason = unsound(received.message) if checked else ""
         if reason:
             self.rejected.append((received.topic.name, reason))
@@ -159,6 +164,8 @@ class RecordedBus:
                 index += 1
                 continue
             del self._waiting[index]
+            while self._idle_work():
+                pass
             if isinstance(event, Received) and not self.hands_out(event):
                 continue
             self.now_ns = event.now_ns if isinstance(event, Tick) else event.published_ns

@@ -57,10 +57,12 @@ class StatusReporter:
 
     def publish(self, now_ns: int) -> None:
         """Publishes the present state and counts."""
+        cut_off = [one.cut_off for one in self._exchange.subscribers.values() if one.cut_off]
+        works = self.state in (NodeStatus.STATE_READY, NodeStatus.STATE_DEGRADED)
         status_message = NodeStatus(
             node=self._node,
-            state=self.state,
-            detail=self._message + self._unconnected(),
+            state=NodeStatus.STATE_DEGRADED if cut_off and works else self.state,
+            detail="; ".join([*cut_off, self._message]) + self._unconnected(),
             pid=os.getpid(),
             processing_seconds=self.processing_ns * 1e-9,
             processed=self.processed,

@@ -11,7 +11,7 @@ from typing import Any
 import zmq
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 
-from paramove.bus.budget import ALLOWANCE, BURST, RateBudget
+from paramove.bus.budget import ALLOWANCE, BURST, CUT_OFF_S, FloodGuard, RateBudget
 from paramove.bus.connecting import file_identity
 from paramove.bus.endpoint import holder_of, socket_path
 from paramove.bus.envelope import FLAG_RING, SIZE, Envelope, Reason, RejectedError, unpack
@@ -57,17 +57,21 @@ class Received:
     resent: bool = False
 
 
-def decoded(topic: Topic, payload: bytes) -> Any:
+def decoded(topic: Topic, payload: bytes, numbers: bool = True) -> Any:
     """The message of a topic; raises RejectedError for a payload that is none, or has unsound numbers.
 
-    A request may have any numbers: nobody reads them, and a stop counts whatever clock its sender has.
+    Args:
+        topic: Row of the table. A request may have any numbers: nobody reads them, and a stop counts whatever clock its
+            sender has.
+        payload: Serialised message.
+        numbers: Whether unsound numbers are searched for, which takes long for a trajectory of thousands of points.
     """
     try:
         message = topic.type.FromString(payload)
     except (DecodeError, ValueError) as error:
         raise RejectedError(Reason.DECODE, f"payload is not a {topic.type_name}: {error}") from error
-    unsound_number = unsound(message)
-    if unsound_number and not topic.is_request:
+    unsound_number = unsound(message) if numbers and not topic.is_request else ""
+    if unsound_number:
         raise RejectedError(Reason.NUMBER, f"{unsound_number}; finite numbers expected, correct the publisher")
     return message
 
@@ -81,10 +85,21 @@ class Subscriber:
         topic: Row of the table.
         name: Name on the bus where it differs from the topic's (a remap).
         node: Name of the node, by which the publisher knows who has subscribed; "" for a visitor of the bus.
+        by_own_clock: Whether the topic's limit counts by this process's clock too, and a publisher that floods is cut
+            off; not in lockstep, where time stands still while messages are read and a run is the same on any machine.
+
+    Attributes:
+        cut_off: Who floods the topic and is cut off therefore, for people; "" normally.
     """
 
     def __init__(
-        self, context: zmq.Context[Any], folder: Path, topic: Topic, name: str | None = None, node: str = ""
+        self,
+        context: zmq.Context[Any],
+        folder: Path,
+        topic: Topic,
+        name: str | None = None,
+        node: str = "",
+        by_own_clock: bool = False,
     ) -> None:
         self.topic = topic
         self.name = name or topic.name
@@ -93,6 +108,9 @@ class Subscriber:
         self._context = context
         self._path = socket_path(folder, self.name)
         self._budget = RateBudget(topic.budget_hz)
+        self._guard = FloodGuard(topic.limit_hz if by_own_clock else None)
+        self.cut_off = ""
+        self._cut_off_until_s = 0.0
         self._frame = self.name.encode() + b"\0"
         self._schema = schema_hash(topic.type)
         # A message begins with the topic's frame and a header, never with this: it only names who has subscribed.
@@ -146,6 +164,7 @@ class Subscriber:
                 envelope, payload = self._read()
             except RejectedError as error:
                 self._reject(error)
+                self._admits()
                 continue
             except OverwrittenError:  # the gap in the sequence counts it
                 continue
@@ -154,6 +173,10 @@ class Subscriber:
             if self.counter.epoch is None and self.topic.type is not NodeStatus:  # of a status the last one is enough
                 self.counter.from_first = file_identity(self._path) != self._found
             arrival = self.counter.accept(envelope)
+            if arrival is Arrival.NEW and not self._admits():
+                self.counter.messages -= 1
+                self._reject(RejectedError(Reason.BUDGET, self._budget_message()))
+                continue
             if arrival is Arrival.NEW:
                 return envelope, payload
             if arrival is Arrival.OUTDATED:
@@ -164,8 +187,12 @@ class Subscriber:
         """Whether libzmq has given the connection up for good, so that only `reopen` helps.
 
         To be called a few times a second. libzmq drops a connection for ever when a message exceeds MAXMSGSIZE or the
-        other side does not speak its protocol. Also keeps `connected` up to date.
+        other side does not speak its protocol. Also keeps `connected` up to date, and ends a cut-off that is over.
         """
+        if self.cut_off and time.monotonic() > self._cut_off_until_s:
+            self.cut_off = ""
+            self._guard.reset()
+            self.socket.setsockopt(zmq.SUBSCRIBE, self._frame)  # the welcome reveals how much was lost
         for event in self._monitor.events():
             if event == zmq.EVENT_DISCONNECTED:
                 self.connected, self._disconnected_s = False, time.monotonic()
@@ -217,7 +244,8 @@ class Subscriber:
             | zmq.EVENT_HANDSHAKE_SUCCEEDED,
         )
         self.socket.connect(f"ipc://{self._path}")
-        self.socket.setsockopt(zmq.SUBSCRIBE, self._frame)
+        if not self.cut_off:
+            self.socket.setsockopt(zmq.SUBSCRIBE, self._frame)
         if self._mark:
             self.socket.setsockopt(zmq.SUBSCRIBE, self._mark)
 
@@ -238,12 +266,24 @@ class Subscriber:
         return envelope, payload
 
     def _decode(self, payload: bytes) -> Any:
-        return decoded(self.topic, payload)
+        return decoded(self.topic, payload, self.topic.has_checked_numbers)
 
     def _check_times(self, envelope: Envelope) -> None:
         if not self.topic.is_request and not envelope.has_possible_times:
             times = f"published at {envelope.published_ns} ns, captured at {envelope.captured_ns} ns"
             raise RejectedError(Reason.NUMBER, f"{times}: at most {LATEST_NS} ns expected")
+
+    def _admits(self) -> bool:
+        """Whether a message that has just arrived is within the topic's limit; cuts off a publisher that floods."""
+        admitted = self._guard.admits()
+        if self._guard.floods and not self.cut_off:
+            self._cut_off_until_s = time.monotonic() + CUT_OFF_S
+            self.cut_off = (
+                f"{holder_of(self._path) or 'its publisher'} floods {self.name} and is cut off for {CUT_OFF_S:g} s"
+            )
+            self.socket.setsockopt(zmq.UNSUBSCRIBE, self._frame)  # what waits is dropped, and no more is sent
+            _log.warning("topic %s: %s; correct the publisher", self.name, self.cut_off)
+        return admitted
 
     def _reject(self, error: RejectedError) -> None:
         self.counter.rejected[error.reason] += 1

@@ -62,6 +62,7 @@ class RealTimeTicks:
 
     def __init__(self, exchange: Exchange) -> None:
         self._exchange = exchange
+        exchange.urgent_first = True
         self._start_ns = time.monotonic_ns()
         self._number = 0
 
@@ -73,8 +74,7 @@ class RealTimeTicks:
     def next(self, names: list[str]) -> Iteration | None:
         exchange = self._exchange
         while not exchange.stopped:
-            exchange.drain(names)
-            messages = exchange.take(names)
+            messages = exchange.take_next(names)
             now_ns = time.monotonic_ns()
             number = (now_ns - self._start_ns) // TICK_PERIOD_NS
             if number > self._number:  # missed ticks are skipped
@@ -95,14 +95,14 @@ class SimulatedTicks:
     def __init__(self, exchange: Exchange) -> None:
         self._exchange = exchange
         self.now_ns = 0
+        exchange.urgent_first = True
         exchange.subscribe(topics.CLOCK)
 
     def next(self, names: list[str]) -> Iteration | None:
         exchange = self._exchange
         while not exchange.stopped:
             exchange.drain([topics.CLOCK.name])  # first: what was published before a tick has then arrived, too
-            exchange.drain(names)
-            messages = exchange.take(names)
+            messages = exchange.take_next(names)
             tick = None
             while (clock := exchange.pop(topics.CLOCK)) is not None:  # missed ticks are skipped
                 self.now_ns = clock.message.time_ns

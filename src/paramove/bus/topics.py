@@ -55,6 +55,8 @@ class Topic:
         frame: Coordinate frame of spatial content; "" where there is none or the message has it.
         recorded: Whether the recorder stores it.
         max_bytes: Largest payload; a larger one is rejected by the publisher and by every subscriber.
+        limit_hz: At most so many a second are of use where messages come with events: a subscriber drops the excess
+            undecoded, and cuts off a publisher that goes on (see `paramove.bus.budget`). None: no limit.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Topic:
     frame: str = ""
     recorded: bool = False
     max_bytes: int = 2**16
+    limit_hz: float | None = None
 
     @property
     def type_name(self) -> str:
@@ -84,6 +87,14 @@ class Topic:
         return self.type in (StopRequest, ArmRequest)
 
     @property
+    def has_checked_numbers(self) -> bool:
+        """Whether a message with unsound numbers is rejected by its subscribers.
+
+        The thousands of numbers of a trajectory are checked by an arm's driver, in slices between which it can be stopped.
+        """
+        return not self.is_request and self.type is not JointTrajectory
+
+    @property
     def is_image(self) -> bool:
         """Whether a message carries pixels, so that its queue is short and its size limit high."""
         return self.type in (RawImage, CompressedImage)
@@ -99,17 +110,27 @@ class Topic:
 
         The clock makes that time, and a status follows the wall clock also in simulated time.
         """
-        return None if self.type in (Clock, NodeStatus) else self.rate_hz
+        return None if self.type in (Clock, NodeStatus) else self.rate_hz or self.limit_hz
+
+    @property
+    def is_urgent(self) -> bool:
+        """Whether its messages overtake all others in a process: what stops an arm, and what keeps it going."""
+        return self.type in (StopRequest, ArmRequest, LinkState)
+
+    @property
+    def is_stop(self) -> bool:
+        """Whether it carries requests to stop, which overtake the other urgent ones too."""
+        return self.type is StopRequest
 
     @property
     def high_water_mark(self) -> int:
         """Queue size of the subscriber; when it is full the latest message is dropped (and counted as lost)."""
-        return 60 if self.is_image else 1000
+        return 60 if self.is_image or self.limit_hz else 1000
 
     @property
     def publisher_high_water_mark(self) -> int:
         """Queue size of the publisher for each subscriber. Few images: they take the publisher's memory."""
-        return 6 if self.is_image else 1000
+        return 6 if self.is_image else self.high_water_mark
 
 
 _LATEST, _QUEUE, _LATCHED = Profile.LATEST, Profile.QUEUE, Profile.LATCHED
@@ -142,7 +163,9 @@ APPLICATION_STAGE = Topic("application/stage", ApplicationStage, 1, _LATCHED, re
 SPEECH = Topic("speech", Speech, None, _QUEUE, recorded=True)
 RELOCATION_GOAL = Topic("relocation/goal", RelocationGoal, None, _QUEUE, "right_shoulder", recorded=True)
 RELOCATION_STATUS = Topic("relocation/status", RelocationStatus, None, _QUEUE, recorded=True)
-ARM_TRAJECTORY = Topic("arm/trajectory", JointTrajectory, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES)
+ARM_TRAJECTORY = Topic(
+    "arm/trajectory", JointTrajectory, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES, limit_hz=20
+)
 ARM_TRAJECTORY_STATUS = Topic("arm/trajectory_status", TrajectoryStatus, None, _QUEUE, recorded=True)
 ARM_JOINT_STATES = Topic("arm/joint_states", JointStates, 15, _QUEUE, recorded=True)
 ARM_JOINT_STATES_FAST = Topic("arm/joint_states/fast", JointStates, 100, _QUEUE, recorded=True)

@@ -37,7 +37,7 @@ def in_own_time(
             become the time here.
     """
     message = decoded(topic, payload)
-    if topic.is_request and not getattr(message, "armed", False):
+    if topic.is_stop or (topic.type is topics.OPERATOR_ARM.type and not message.armed):
         message.captured.FromNanoseconds(now_ns)
         return envelope._replace(published_ns=now_ns, captured_ns=now_ns), message
     bound_ns = clock.bound_ns(now_ns)

@@ -336,7 +336,8 @@ class _Source:
     def __init__(self, context: zmq.Context[Any], bus: Bus, topic: Topic, name: str) -> None:
         self.topic, self.name = topic, name
         self.head = Content(topic=name)
-        self.subscriber = Subscriber(context, bus.settings.folder, topic, name, bus.node)
+        by_own_clock = bus.settings.clock == "monotonic"
+        self.subscriber = Subscriber(context, bus.settings.folder, topic, name, bus.node, by_own_clock)
         self._known: tuple[int | None, int] = (None, 0)
         self._last: tuple[Envelope, bytes] | None = None
 

@@ -16,5 +16,7 @@ from .self_collision import SelfCollision as SelfCollision
 from .stopping import longest_path_s as longest_path_s
 from .stopping import stop_ramp as stop_ramp
 from .stopping import straight_move as straight_move
+from .trajectory_check import CheckedPath as CheckedPath
 from .trajectory_check import TrajectoryRejectedError as TrajectoryRejectedError
+from .trajectory_check import check_in_slices as check_in_slices
 from .trajectory_check import check_trajectory as check_trajectory

@@ -30,6 +30,15 @@ JUMP_FACTOR = 1.5
 INWARD_FRACTION = 0.2
 # A controlled stop has the path's own jerk and as much again for the slowing down.
 STOP_JERK_FACTOR = 2.0
+RULES = {
+    "not_finite": "is not a finite number",
+    "joint_limit": "leaves its range",
+    "jump": "jumps",
+    "velocity": "is too fast",
+    "acceleration": "accelerates too hard",
+    "jerk": "changes its acceleration too fast",
+}
+"""In the gate's order, and what breaks each, for people."""
 
 
 @dataclass(frozen=True)
@@ -48,16 +57,14 @@ class Violation:
     step: tuple[float, float] | None = None
 
     @property
+    def rank(self) -> int:
+        """Of its rule in the gate's order."""
+        return list(RULES).index(self.code)
+
+    @property
     def message(self) -> str:
         """Cause, the requested value and what is allowed."""
-        what = {
-            "not_finite": "is not a finite number",
-            "joint_limit": "leaves its range",
-            "jump": "jumps",
-            "velocity": "is too fast",
-            "acceleration": "accelerates too hard",
-            "jerk": "changes its acceleration too fast",
-        }[self.code]
+        what = RULES[self.code]
         step = "" if self.step is None else f" from {self.step[0]:.4g} to {self.step[1]:.4g} deg"
         where = f"joint {self.joint} {what}{step} at row {self.row}"
         return f"{where}: requested {self.requested:.4g} {self.unit}, allowed {self.allowed}"

@@ -1,18 +1,23 @@
-"""A whole trajectory, judged before any of it is streamed, and the rows that will be streamed if it passes."""
+"""A whole trajectory, judged before any of it is streamed, and the rows that will be streamed if it passes.
+
+The check of a long one takes longer than a stop may wait, so it is done in slices of a few milliseconds.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from paramove.documents import Floats
-from paramove.safety.limits import MotionLimits
-from paramove.safety.path_sampling import largest_detour, minimum_jerk, sample_path
+from paramove.safety.limits import MotionLimits, Violation
+from paramove.safety.path_sampling import ROWS_AT_ONCE, detours, minimum_jerk, n_rows, sampled_pieces
 
 MAX_DURATION_S = 120.0
+MAX_POINTS = 24_001
+"""The longest movement by points 5 ms apart."""
 MAX_DETOUR = np.deg2rad(1.0)
 FADE_S = 0.5
 
@@ -21,8 +26,8 @@ class TrajectoryRejectedError(ValueError):
     """A trajectory that will not be played.
 
     Attributes:
-        code: "joints", "times", "not_finite", "joint_limit", "start", "detour", "jump", "velocity", "acceleration"
-            or "jerk".
+        code: "joints", "points", "times", "not_finite", "joint_limit", "start", "detour", "jump", "velocity",
+            "acceleration" or "jerk".
         index: Point of the trajectory, from 0; -1 where no single point is at fault.
         joint: Name of the joint; "" where no single joint is at fault.
         requested, allowed: The value in the trajectory, and what would have passed.
@@ -60,7 +65,27 @@ def check_trajectory(
     limits: MotionLimits,
     start_tolerance: ArrayLike,
 ) -> CheckedPath:
-    """Check a trajectory and expand it to rows at the stream's period.
+    """Check a trajectory and expand it to rows at the stream's period, all at once: see `check_in_slices`."""
+    checking = check_in_slices(joints, times_s, positions, commanded, limits, start_tolerance)
+    while True:
+        try:
+            next(checking)
+        except StopIteration as end:
+            path: CheckedPath = end.value
+            return path
+
+
+def check_in_slices(
+    joints: Sequence[str],
+    times_s: ArrayLike,
+    positions: Sequence[Sequence[float]],
+    commanded: Floats,
+    limits: MotionLimits,
+    start_tolerance: ArrayLike,
+) -> Generator[None, None, CheckedPath]:
+    """Check a trajectory and expand it to rows at the stream's period; yields between slices of a few milliseconds.
+
+    The result is the same however many slices there are.
 
     Args:
         joints: Names of the joints that move; the others stay at `commanded`.
@@ -71,23 +96,31 @@ def check_trajectory(
         start_tolerance: How far the first point may lie from `commanded`, rad, for all joints or [J]. The difference is
             faded out.
 
+    Returns:
+        The rows, when the generator ends.
+
     Raises:
         TrajectoryRejectedError: With the point, the joint, the requested value and what is allowed.
     """
     indices = _indices(joints, limits)
-    points = _points(joints, positions)
+    points = yield from _points(joints, positions)
     times = _times(times_s, len(points))
     tolerance = np.broadcast_to(np.asarray(start_tolerance, dtype=np.float64), commanded.shape)[indices]
     _check_points(joints, points, indices, commanded, limits, tolerance)
-    segment, column, detour = largest_detour(times, points)
-    if detour > MAX_DETOUR:
-        allowed = f"{np.rad2deg(MAX_DETOUR):.3g} deg between points; give points closer together"
-        raise TrajectoryRejectedError("detour", segment, joints[column], f"{np.rad2deg(detour):.3g} deg", allowed)
-    moving = sample_path(times, points, limits.dt_s)
-    moving += _fade(len(moving), limits.dt_s)[:, None] * (commanded[indices] - points[0])
-    rows = np.repeat(commanded[None], len(moving), axis=0)
-    rows[:, indices] = moving
-    _check_rows(rows, times, commanded, limits)
+    yield
+    yield from _check_detours(joints, times, points)
+    moving = np.empty((n_rows(times, limits.dt_s), len(joints)))
+    for first, piece in sampled_pieces(times, points, limits.dt_s):
+        moving[first : first + len(piece)] = piece
+        yield
+    fade = _fade(len(moving), limits.dt_s)
+    rows = np.empty((len(moving), len(commanded)))
+    for first in range(0, len(rows), ROWS_AT_ONCE):
+        part = slice(first, first + ROWS_AT_ONCE)
+        rows[part] = commanded
+        rows[part, indices] = moving[part] + fade[part, None] * (commanded[indices] - points[0])
+        yield
+    yield from _check_rows(rows, times, commanded, limits)
     return CheckedPath(rows, limits.dt_s)
 
 
@@ -102,13 +135,20 @@ def _indices(joints: Sequence[str], limits: MotionLimits) -> NDArray[np.intp]:
     return np.array([limits.names.index(joint) for joint in joints], dtype=np.intp)
 
 
-def _points(joints: Sequence[str], positions: Sequence[Sequence[float]]) -> Floats:
+def _points(joints: Sequence[str], positions: Sequence[Sequence[float]]) -> Generator[None, None, Floats]:
     if len(positions) < 2:
         raise TrajectoryRejectedError("times", -1, "", f"{len(positions)} points", "at least 2")
-    for index, point in enumerate(positions):
-        if len(point) != len(joints):
-            raise TrajectoryRejectedError("joints", index, "", f"{len(point)} angles", f"{len(joints)}")
-    points = np.array([list(point) for point in positions], dtype=np.float64)
+    if len(positions) > MAX_POINTS:
+        allowed = f"up to {MAX_POINTS}; give points further apart"
+        raise TrajectoryRejectedError("points", -1, "", f"{len(positions)} points", allowed)
+    points = np.empty((len(positions), len(joints)))
+    for first in range(0, len(positions), ROWS_AT_ONCE):
+        part = positions[first : first + ROWS_AT_ONCE]
+        for index, point in enumerate(part, first):
+            if len(point) != len(joints):
+                raise TrajectoryRejectedError("joints", index, "", f"{len(point)} angles", f"{len(joints)}")
+        points[first : first + len(part)] = [list(point) for point in part]
+        yield
     bad = np.argwhere(~np.isfinite(points))
     if len(bad):
         index, column = (int(i) for i in bad[0])
@@ -162,8 +202,28 @@ def _check_points(
         raise TrajectoryRejectedError("start", 0, joints[column], _deg(points[0, column]), allowed)
 
 
-def _check_rows(rows: Floats, times: Floats, commanded: Floats, limits: MotionLimits) -> None:
-    violation = limits.first_violation(rows, commanded[None], rest_at_end=True)
+def _check_detours(joints: Sequence[str], times: Floats, points: Floats) -> Generator[None, None, None]:
+    worst = (0, 0, 0.0)
+    for found in detours(times, points):
+        worst = max(worst, found, key=lambda one: one[2])
+        yield
+    segment, column, detour = worst
+    if detour > MAX_DETOUR:
+        allowed = f"{np.rad2deg(MAX_DETOUR):.3g} deg between points; give points closer together"
+        raise TrajectoryRejectedError("detour", segment, joints[column], f"{np.rad2deg(detour):.3g} deg", allowed)
+
+
+def _check_rows(rows: Floats, times: Floats, commanded: Floats, limits: MotionLimits) -> Generator[None, None, None]:
+    """Of all rows, the first violation of the first rule that is broken, in the gate's order."""
+    violation: Violation | None = None
+    before = commanded[None]
+    for first in range(0, len(rows), ROWS_AT_ONCE):
+        part = rows[first : first + ROWS_AT_ONCE]
+        found = limits.first_violation(part, before, rest_at_end=first + len(part) == len(rows))
+        if found is not None and (violation is None or found.rank < violation.rank):
+            violation = replace(found, row=first + found.row)
+        before = np.concatenate([before, part])[-limits.history :]
+        yield
     if violation is None:
         return
     row_time = min(violation.row * limits.dt_s, times[-1])

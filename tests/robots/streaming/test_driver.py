@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
-from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
+from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState, StopRequest
 from paramove.robots.streaming.driver import ArmDriver
 from paramove.safety.gate_io import State
 from tests.robots.hoap3.movements import HOAP3
@@ -249,3 +249,54 @@ def test_whatever_is_lost_the_robot_moves_smoothly(pattern: list[str]) -> None:
 
 def test_states_of_the_status_are_those_of_the_message() -> None:
     assert (TrajectoryStatus.STATE_ACCEPTED, TrajectoryStatus.STATE_REJECTED) == (ACCEPTED, REJECTED)
+
+
+def in_slices() -> Rig:
+    """An armed arm whose driver checks trajectories while it has nothing else to do."""
+    rig = Rig()
+    rig.driver = ArmDriver(HOAP3, checks_in_slices=True)
+    rig.tick()
+    rig.arm()
+    assert rig.driver.state is State.ARMED
+    return rig
+
+
+def test_a_trajectory_that_is_checked_in_slices_begins_with_the_tick_after_its_check() -> None:
+    rig = in_slices()
+    rig.send("long", {"right_elbow": -60.0}, duration_s=60.0)
+    rig.tick()
+    assert rig.driver.check_on()
+    rig.send("long", {"right_elbow": -60.0}, duration_s=60.0)  # once more: it is known
+    rig.send("second", {"right_elbow": -60.0})
+    rig.tick()
+    assert [(one.trajectory_id, one.code) for one in rig.statuses] == [("second", "busy")]
+    while rig.driver.check_on():
+        pass
+    assert rig.tick().stream is not None
+    assert ("long", TrajectoryStatus.STATE_ACCEPTED) in [(one.trajectory_id, one.state) for one in rig.statuses]
+
+
+def test_a_check_that_is_not_over_is_given_up_after_a_stop_or_when_it_takes_too_long() -> None:
+    rig = in_slices()
+    rig.send("slow", {"right_elbow": -60.0}, duration_s=60.0)
+    for _ in range(60):
+        rig.tick()
+    assert [(one.trajectory_id, one.code) for one in rig.statuses] == [("slow", "stale")]
+    rig.send("stopped", {"right_elbow": -60.0}, duration_s=60.0)
+    rig.tick()
+    rig.driver.on_stop(StopRequest(source="page"))
+    rig.tick()
+    rig.tick()
+    assert rig.driver.state is State.HOLD
+    assert (rig.statuses[-1].trajectory_id, rig.statuses[-1].code) == ("stopped", "not_armed")
+    assert not rig.driver.check_on()
+
+
+def test_a_movement_that_was_made_before_the_arm_was_armed_is_not_played() -> None:
+    rig = Rig()
+    rig.tick()
+    made_ns = rig.now_ns
+    rig.arm()
+    rig.driver.on_trajectory(trajectory("early", {"right_elbow": -60.0}, 1.0), made_ns)
+    rig.tick()
+    assert [(one.trajectory_id, one.code) for one in rig.statuses] == [("early", "stale")]

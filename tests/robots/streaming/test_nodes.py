@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,9 @@ class RobotBus:
     def ready(self, detail: str) -> None:
         assert detail
 
+    def when_idle(self, work: Callable[[], bool]) -> None:
+        self.work = work
+
     def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
         assert topic in arm_driver.PUBLISHES
         assert isinstance(message, topic.type)
@@ -65,6 +68,8 @@ class RobotBus:
             heard, self.pending = self.pending, []
             for topic, message in heard:
                 yield Received(topic, message, self.now_ns, self.now_ns, number)
+            while self.work():
+                pass
             yield Tick(number, self.now_ns)
             self.robot.play()
 

@@ -1,9 +1,9 @@
 """The arm driver's logic: accepted trajectories to batches of the robot's stream, through the safety gate.
 
 One `tick` a camera period. A trajectory is checked whole and expanded to rows of 1 ms when it arrives (thesis 5.2.1:
-the components outside the trajectory keep their pose). Each tick then sends the rows from a guard behind the latest
-known index on, about 300 ms of them, and the gate adds the stop ramp. If ticks or batches stop, the robot rests by
-itself.
+the components outside the trajectory keep their pose), in slices, because a stop may not wait for it. Each tick then
+sends the rows from a guard behind the latest known index on, about 300 ms of them, and the gate adds the stop ramp. If
+ticks or batches stop, the robot rests by itself.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, SafetyFault, S
 from paramove.robots import RobotDescription
 from paramove.robots.streaming.execution import Execution, RobotReport
 from paramove.robots.streaming.stream import StreamBatch, StreamState
+from paramove.robots.streaming.trajectory_check import TrajectoryCheck
 from paramove.safety import (
     PERSON_STOP,
     TOUCHED,
@@ -31,7 +32,6 @@ from paramove.safety import (
     SafetySettings,
     State,
     TrajectoryRejectedError,
-    check_trajectory,
     longest_path_s,
 )
 
@@ -45,6 +45,8 @@ SAFETY_STATES = {
 }
 # A trajectory received later than this after it was made is a replay or comes from a queue that was stuck.
 MAX_TRAJECTORY_AGE_S = 1.0
+# The check of a trajectory takes longer only on a machine that is much too slow or busy.
+MAX_CHECK_S = 3.0
 # One from the future has a clock of its own; a publisher's clock may be ahead by as much as this.
 MAX_TRAJECTORY_LEAD_S = 0.05
 # A driver that did nothing for longer has let the robot run out of rows; the messages that waited for it are dropped.
@@ -78,6 +80,9 @@ class ArmDriver:
             launch of this driver emulates the robot.
         link_timeout_s: When commands come from another host: after so long without a reply from there the link counts
             as lost, which stops the robot, and nobody arms. None: there is no other host.
+        checks_in_slices: Whether trajectories are checked by `check_on`, which is to be called while nothing else is to
+            be done, and begin with the tick after it; by default `tick` checks them whole, as in lockstep, where
+            time stands still meanwhile.
 
     The driver begins with its first tick and ignores arming requests and trajectories from before it. So a restarted
     driver is disarmed; the stream's epoch is made of that tick's time. A stop has no age: whatever time its sender has
@@ -92,8 +97,12 @@ class ArmDriver:
         clearance: Clearance | None = None,
         no_program: Callable[[], str] = lambda: Inputs.no_program,
         link_timeout_s: float | None = None,
+        checks_in_slices: bool = False,
     ) -> None:
         self._description = description
+        self._checks_in_slices = checks_in_slices
+        self._check: TrajectoryCheck | None = None
+        self._armed_ns = 0
         self._link_timeout_s = link_timeout_s
         self._link: tuple[int | None, str] = (None, "the other host")
         self._no_program = no_program
@@ -213,8 +222,10 @@ class ArmDriver:
         stalled_s = stalled_s if stalled_s > MAX_STALL_S else 0.0
         self._now_ns = now_ns
         self._ticks += 1
+        self._take_checked()
         self._judge_trajectories(stalled_s)
         self._judge_stops()
+        was_armed = self._core.state is State.ARMED
         requests: list[ArmingRequest | None] = [*self._arming_requests] or [None]
         self._arming_requests.clear()
         measured = self._report.measured(self._epoch) if self._report else None
@@ -232,6 +243,8 @@ class ArmDriver:
             inputs = Inputs(measured, request, proposal, stop, *checks, no_program)
             accepted, _, _ = self._core.step(now_ns, inputs)
             targets = accepted or targets
+        if not was_armed:
+            self._armed_ns = now_ns
         self._emergency = self._checks_began_ns = None
         if self._core.state is not State.DISCONNECTED:  # there a stop waits for data from the robot
             self._stop = None
@@ -265,44 +278,93 @@ class ArmDriver:
             if known is not None:
                 self._statuses.append(known)
                 continue
+            if self._check is not None and self._check.trajectory_id == message.id:
+                continue
             try:
                 if stalled_s:
                     allowed = f"up to {MAX_STALL_S:g} s; send it again"
                     raise TrajectoryRejectedError(
                         "stale", -1, "", f"a driver that stalled for {stalled_s:.2f} s", allowed
                     )
-                self._begin(message, captured_ns)
+                self._begin_check(message, captured_ns)
             except TrajectoryRejectedError as error:
-                self._rejected += 1
-                self._add_status(message.id, TrajectoryStatus.STATE_REJECTED, 0.0, 0.0, str(error), error.code)
+                self._reject(message.id, error)
+            if not self._checks_in_slices and self._check is not None:
+                self._check.go_on(float("inf"))
+                self._take_checked()
 
-    def _begin(self, message: JointTrajectory, captured_ns: int) -> None:
+    def _reject(self, trajectory_id: str, error: TrajectoryRejectedError) -> None:
+        self._rejected += 1
+        self._add_status(trajectory_id, TrajectoryStatus.STATE_REJECTED, 0.0, 0.0, str(error), error.code)
+
+    def _begin_check(self, message: JointTrajectory, captured_ns: int) -> None:
         report = self._report
         if self._core.state is not State.ARMED or report is None:
             state = self._core.state.value
             raise TrajectoryRejectedError("not_armed", -1, "", f"a movement while {state}", "only while armed")
         if not message.id:
             raise TrajectoryRejectedError("id", -1, "", "an empty id", "a name for the trajectory")
-        if self._execution is not None:
-            busy = self._execution.trajectory_id
-            raise TrajectoryRejectedError("busy", -1, "", "a second trajectory", f"one at a time; {busy} is executed")
+        under_way = self._execution or self._check
+        if under_way is not None:
+            allowed = f"one at a time; {under_way.trajectory_id} is executed"
+            raise TrajectoryRejectedError("busy", -1, "", "a second trajectory", allowed)
+        if captured_ns < self._armed_ns:
+            raise TrajectoryRejectedError("stale", -1, "", "a movement from before the arm was armed", "later ones")
         age_s = (self._now_ns - captured_ns) * 1e-9
         if not -MAX_TRAJECTORY_LEAD_S <= age_s <= MAX_TRAJECTORY_AGE_S:
             allowed = f"{-MAX_TRAJECTORY_LEAD_S:g} to {MAX_TRAJECTORY_AGE_S:g} s"
             raise TrajectoryRejectedError("stale", -1, "", f"age {age_s:.2f} s", allowed)
         next_index = report.next_index(self._epoch)
         held = self._core.held(next_index) if report.stream.epoch == self._epoch else None
-        path = check_trajectory(
-            list(message.joints),
-            [point.time_s for point in message.points],
-            [list(point.position_rad) for point in message.points],
+        self._check = TrajectoryCheck(
+            message,
+            self._now_ns,
+            next_index,
             report.commanded if held is None else held,
             self._limits,
             self._start_tolerance,
         )
+
+    def check_on(self) -> bool:
+        """Checks a waiting trajectory for some milliseconds; returns whether there is more to check.
+
+        May be called from another thread than `tick`, without its lock.
+        """
+        check = self._check
+        return check is not None and check.go_on()
+
+    def _take_checked(self) -> None:
+        """Begin a trajectory whose check is over, or reject it; reject one whose check takes too long."""
+        check, report = self._check, self._report
+        if check is None or report is None:
+            return
+        try:
+            self._raise_if_outdated(check, report)
+            if check.error is not None:
+                raise check.error
+        except TrajectoryRejectedError as error:
+            self._check = None
+            self._reject(check.trajectory_id, error)
+            return
+        if check.path is None:
+            return
+        self._check = None
         self._guard_ms = self._description.stream.guard_ms
-        self._execution = Execution(message.id, path.rows, path.dt_s, next_index, self._now_ns)
-        self._add_status(message.id, TrajectoryStatus.STATE_ACCEPTED, 0.0, path.duration_s, "")
+        path = check.path
+        self._execution = Execution(check.trajectory_id, path.rows, path.dt_s, check.start_index, self._now_ns)
+        self._add_status(check.trajectory_id, TrajectoryStatus.STATE_ACCEPTED, 0.0, path.duration_s, "")
+
+    def _raise_if_outdated(self, check: TrajectoryCheck, report: RobotReport) -> None:
+        """What was checked no longer fits: the arm was stopped meanwhile, or it moved, or the check takes too long."""
+        if self._core.state is not State.ARMED:
+            state = self._core.state.value
+            raise TrajectoryRejectedError("not_armed", -1, "", f"a movement while {state}", "only while armed")
+        if report.next_index(self._epoch) != check.start_index:
+            raise TrajectoryRejectedError("start", -1, "", "another row of the stream", "one from where the robot is")
+        check_s = (self._now_ns - check.begun_ns) * 1e-9
+        if check_s > MAX_CHECK_S:
+            allowed = f"up to {MAX_CHECK_S:g} s; see what keeps this computer busy"
+            raise TrajectoryRejectedError("stale", -1, "", f"a check of {check_s:.1f} s", allowed)
 
     def _proposal(self, now_ns: int) -> Proposal | None:
         execution, report = self._execution, self._report

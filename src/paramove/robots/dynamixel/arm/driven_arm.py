@@ -59,7 +59,9 @@ class DrivenArm:
         self._caution, self._clock = settings.caution, port.clock
         d, model = description, mujoco.MjModel.from_xml_path(str(description.model_path))
         clearance = SelfCollision(model, d.joint_names, d.base_pose, d.soft_lower, d.soft_upper)
-        self._driver = ArmDriver(d, safety, clearance, settings.why_no_program, settings.link_timeout_s)
+        self._driver = ArmDriver(
+            d, safety, clearance, settings.why_no_program, settings.link_timeout_s, settings.checks_in_slices
+        )
         self.readable, self._written = os.pipe2(os.O_NONBLOCK)
         self._loop = ServoLoop(self._driver, description, servos, port, settings, self._wake)
         self._slow_ns = self._safety_ns = self._motors_ns = 0
@@ -113,6 +115,10 @@ class DrivenArm:
         with self._loop.lock:
             self._driver.on_stop(message, resent)
         self._loop.tick()
+
+    def check_on(self) -> bool:
+        """Checks a waiting trajectory for some milliseconds while the loop goes on; returns whether there is more."""
+        return self._driver.check_on()
 
     def run_to(self, time_ns: int) -> None:
         """Drive the arm up to a time, if it is an emulator's; else the arm is driven by itself.

@@ -67,7 +67,7 @@ class LoopSettings:
         emulated_by: The launch that emulates the servos, which is verified at every open of the port; None:
             they count as real.
         caution: A message to show in any case.
-        link_timeout_s: See `ArmDriver`.
+        link_timeout_s, checks_in_slices: See `ArmDriver`.
     """
 
     torque_off: bool = False
@@ -78,6 +78,7 @@ class LoopSettings:
     emulated_by: ThisLaunch | None = None
     caution: str = ""
     link_timeout_s: float | None = None
+    checks_in_slices: bool = False
 
     def why_no_program(self) -> str:
         """Why no program may arm the arm; "" if one may."""
@@ -319,6 +320,7 @@ class ServoLoop:
                 reason = "it took too long"
                 break
             begun_ns = self._clock.now_ns
+            self.driver.check_on()
             with self.lock:
                 self._one_period()
             self._clock.wait_until(begun_ns + self._period_ns)

@@ -79,13 +79,20 @@ class ServoArmSetup(OldNames):
     stop_line_pressed: Literal[0, 1] = 1
     link_timeout_s: Annotated[float, Field(gt=0.0, le=0.1)] | None = None
 
-    def driven_arm(self, run_folder: Path, launch: ThisLaunch | None = None, paced_in: Path | None = None) -> DrivenArm:
+    def driven_arm(
+        self,
+        run_folder: Path,
+        launch: ThisLaunch | None = None,
+        paced_in: Path | None = None,
+        checks_in_slices: bool = False,
+    ) -> DrivenArm:
         """The arm, not yet driven.
 
         Args:
             run_folder: That relative names start from.
             launch: That may emulate the servos; None: none does.
             paced_in: The bus folder, with the control socket of emulated servos that this loop paces, in lockstep.
+            checks_in_slices: See `ArmDriver`; somebody has to call `DrivenArm.check_on`.
 
         Raises:
             InputError: Its description or calibration is missing or wrong, or is another arm's; or in lockstep its
@@ -114,6 +121,7 @@ class ServoArmSetup(OldNames):
             emulated_by=None if emulated is None else launch,
             caution=f"{port.name} counts as a real arm, which a person arms: {reason}" if is_refused else "",
             link_timeout_s=self.link_timeout_s,
+            checks_in_slices=checks_in_slices,
         )
         return DrivenArm(description, joint_servos(description, calibration), port, settings)
 
