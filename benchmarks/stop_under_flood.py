@@ -24,6 +24,7 @@ import contextlib
 import json
 import math
 import multiprocessing
+import select
 import subprocess
 import sys
 import tempfile
@@ -298,8 +299,12 @@ def measure(name: str, kind: str, hosts: int, after_s: float) -> tuple[float, fl
             opened.enter_context(BusVisitor(driver, "world")),
         )
         world = World(robot, person, beside)
-        world.arms()
         assert flooder.stdin is not None
+        assert flooder.stdout is not None
+        while not select.select([flooder.stdout], [], [], 0.0)[0]:
+            world.step()
+        assert flooder.stdout.readline() == "ready\n"
+        world.arms()
         flooder.stdin.write("go\n")
         flooder.stdin.flush()
         world.goes_on(LEAD_S + after_s)
