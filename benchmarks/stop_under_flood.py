@@ -1,6 +1,6 @@
 """How long a person's stop takes while trajectories flood the driver of an arm that moves.
 
-    python benchmarks/stop_under_flood.py [--stops 100] [--robots hoap3,koch_v1_1] [--kinds valid,large]
+    python benchmarks/stop_under_flood.py [--stops 100] [--robots hoap3,open_manipulator_x] [--kinds valid,large]
                                           [--hosts 1,2] [--busy 2] [--json FILE]
 
 Each stop is with new processes: the real driver node, emulated servos or a robot that only plays its stream, and a
@@ -350,7 +350,7 @@ def main() -> None:
     """Measures all cases in turn."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--stops", type=int, default=100, help="of each case")
-    parser.add_argument("--robots", default="hoap3,koch_v1_1")
+    parser.add_argument("--robots", default="hoap3,open_manipulator_x")
     parser.add_argument("--kinds", default=",".join(KINDS))
     parser.add_argument("--hosts", default="1,2")
     parser.add_argument("--busy", type=int, default=0, help="programs that never rest")
