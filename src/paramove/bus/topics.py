@@ -90,7 +90,7 @@ class Topic:
     def has_checked_numbers(self) -> bool:
         """Whether a message with unsound numbers is rejected by its subscribers.
 
-        The thousands of numbers of a trajectory are checked by an arm's driver, in slices between which it can be stopped.
+        The thousands of numbers of a trajectory are checked by an arm's driver, in slices between which a stop acts.
         """
         return not self.is_request and self.type is not JointTrajectory
 
