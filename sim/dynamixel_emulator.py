@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic import Field
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
-from paramove.motion import check_model
+from paramove.motion import check_grip, check_model
 from paramove.robots import RobotDescription, RobotFolder
 from sim.emulated_arm import EmulatedArm
 
@@ -41,6 +41,7 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then remove the port. Servos run in real time, independent of the bus clock."""
     robot = RobotDescription.load(config.robot)
     check_model(robot)
+    check_grip(robot, robot.model_path.parent / config.scene)
     control = bus.run_folder / config.control if config.control else None
     link = bus.run_folder / config.port
     with EmulatedArm(

@@ -170,13 +170,21 @@ def _left_out(launch: Launch) -> str:
 
 
 def _check_robots(launch: Launch) -> None:
-    """Compares the robots that the nodes drive or simulate with their models. Raises DescriptionError."""
-    from paramove.motion import check_model
+    """Compares the robots that the nodes drive or simulate with their models, and rehearses the grip of emulated ones.
+
+    Raises DescriptionError.
+    """
+    from paramove.motion import check_grip, check_model
     from paramove.robots import RobotDescription
 
     folders = {node.parameters["robot"] for node in launch.file.nodes.values() if "robot" in node.parameters}
     for folder in sorted(folders):
         check_model(RobotDescription.load(folder))
+    for node in launch.file.nodes.values():
+        scene = node.parameters.get("scene", "scene.xml")
+        if node.module == "sim.dynamixel_emulator" and "robot" in node.parameters:
+            robot = RobotDescription.load(node.parameters["robot"])
+            check_grip(robot, robot.model_path.parent / scene)
 
 
 def _found(launch: Launch, environment: Environment, workspace: Workspace) -> list[str]:

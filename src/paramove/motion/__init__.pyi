@@ -1,5 +1,6 @@
 from .arm_pose import ArmPoseSolver as ArmPoseSolver
 from .conversion import RobotMovement as RobotMovement
+from .grip_check import check_grip as check_grip
 from .gripper_arm import GripperArm as GripperArm
 from .model_check import check_model as check_model
 from .plans import FARTHEST_M as FARTHEST_M
