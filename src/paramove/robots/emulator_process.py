@@ -82,10 +82,6 @@ def _modules_in(folder: Path) -> list[Path]:
     return [file for file in files if file.name.endswith(tuple(all_suffixes())) or (file / "__init__.py").is_file()]
 
 
-def _is_among(folder: Path, others: list[Path]) -> bool:
-    return any(_same_file(folder, other) for other in others)
-
-
 def _same_file(one: Path, other: Path) -> bool:
     try:
         return one.samefile(other)

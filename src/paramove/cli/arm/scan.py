@@ -29,7 +29,7 @@ def scan(
 ) -> None:
     """List the servos at every adapter: ID, model, firmware, baud rate, voltage, temperature, errors, torque.
 
-    Reads only. All usual baud rates are asked, which takes about 6 s for each adapter, and 6 s more where two servos
+    Reads only. All usual baud rates are asked, which takes about 10 s for each adapter, and 6 s more where two servos
     have one ID.
 
     Exit codes: 0 servos were found; 3 something about them must be put right; 69 no adapter, or no servo answers;

@@ -75,6 +75,40 @@ def test_servos_of_all_baud_rates_are_found():
     assert (found.asked, found.findings()) == (list(USUAL_BAUD_RATES), [])
 
 
+@pytest.mark.parametrize("rate", [9_600, 4_500_000])
+def test_the_slowest_and_the_fastest_baud_rate_of_servos_are_among_the_usual_ones(rate):
+    found = scanned([EmulatedServo("xm430_w350", 1, rate)])
+    assert [(one.number, one.baud_rate) for one in found.servos] == [(1, rate)]
+
+
+class OlderServos:
+    """Servos 1 and 3 that understand Protocol 1.0 only, with model number 12, on a bus."""
+
+    def __init__(self, _receive, ids=(1, 3)):
+        self._ids = ids
+
+    def __call__(self, data, baud_rate, now_s):
+        begins = data[:2] == b"\xff\xff" and data[2] in self._ids and data[3] == len(data) - 4
+        if baud_rate != RATE or not begins or data[-1] != ~sum(data[2:-1]) & 255:
+            return []
+        values = b"\x0c\x00" if data[4] == 2 else b""  # read; else ping
+        body = bytes([data[2], 2 + len(values), 0]) + values
+        return [(0.0, b"\xff\xff" + body + bytes([~sum(body) & 255]))]
+
+
+def test_servos_of_protocol_1_are_named_with_id_and_model_number():
+    found = scanned([], receive=OlderServos)
+    assert [(one.number, one.model_number, one.baud_rate) for one in found.older] == [(1, 12, RATE), (3, 12, RATE)]
+    assert found.servos == []
+    assert all("Protocol 1.0" in message for message in found.findings())
+    assert len(found.findings()) == 2
+
+
+def test_a_reply_to_every_id_is_no_servo_of_protocol_1():
+    found = scanned([], receive=lambda receive: OlderServos(receive, ids=range(254)))
+    assert found.older == []
+
+
 def test_a_model_that_only_the_sdk_knows_is_told_with_its_state_and_another_by_its_number():
     servos = [EmulatedServo("xl430_w250", number, RATE) for number in (1, 2)]
     servos[0].memory["Model Number"], servos[1].memory["Model Number"] = 1080, 9

@@ -13,17 +13,21 @@ from functools import cache
 
 from dynamixel_easy_sdk.control_table import ControlTable
 from dynamixel_easy_sdk.dynamixel_error import DxlRuntimeError
+from dynamixel_sdk import COMM_SUCCESS
+from dynamixel_sdk.protocol1_packet_handler import Protocol1PacketHandler
 
 from paramove.documents import InputError
 from paramove.robots.dynamixel.bus.servo_chain import PingedServo, ServoChain
 from paramove.robots.dynamixel.bus.servo_models import MODELS, Register, ServoModel
 from paramove.robots.dynamixel.bus.servo_port import PortLostError
 
-USUAL_BAUD_RATES = (57_600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000)
-"""bit/s; the first is set at the factory."""
+USUAL_BAUD_RATES = (57_600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000, 4_500_000, 9_600)
+"""bit/s, all that a servo can have; the first is set at the factory, the last takes longest and is the rarest."""
 ALL_IDS = range(253)
 NOBODYS_ID = 253
 """An ID that no servo can have (ROBOTIS e-Manual, "Protocol 2.0", Packet ID)."""
+OLDER_IDS = range(1, 7)
+"""Asked in Protocol 1.0 if nothing replies in Protocol 2.0: 1 is set at the factory, and arms are numbered from it."""
 READS = 3
 """Of each servo: replies of two with one ID differ, so that sooner or later they are damaged."""
 SHORT_LATENCY_S = 0.02
@@ -117,6 +121,15 @@ class DetectedServo:
 
 
 @dataclass(frozen=True)
+class OlderServo:
+    """A servo that replies in Protocol 1.0 only: ID, model number as it reports it, baud rate, bit/s."""
+
+    number: int
+    model_number: int
+    baud_rate: int
+
+
+@dataclass(frozen=True)
 class BusScan:
     """The result of a scan.
 
@@ -125,12 +138,14 @@ class BusScan:
         asked: Baud rates that were scanned; without those that the adapter does not have.
         damaged: Of these, those with damaged replies to the ping of all.
         foreign: Of these, those with bytes that are no reply of a servo.
+        older: Servos of Protocol 1.0, which are asked if there is none of Protocol 2.0.
     """
 
     servos: list[DetectedServo] = field(default_factory=list)
     asked: list[int] = field(default_factory=list)
     damaged: list[int] = field(default_factory=list)
     foreign: list[int] = field(default_factory=list)
+    older: list[OlderServo] = field(default_factory=list)
 
     @property
     def faults(self) -> list[str]:
@@ -142,6 +157,12 @@ class BusScan:
         if self.foreign:
             rates = listed(self.foreign)
             messages.append(f"bytes at {rates} bit/s are no answer of a servo: another device, or a bad cable")
+        for servo in self.older:
+            messages.append(
+                f"ID {servo.number} (model number {servo.model_number}) at {servo.baud_rate} bit/s replies in Protocol "
+                "1.0, as Dynamixel AX and RX, older MX, and Feetech servos do; servos of Protocol 2.0 are driven. "
+                "Firmware for Protocol 2.0 exists for MX-28, MX-64 and MX-106"
+            )
         return messages
 
     def findings(self, baud_rate: int = 0) -> list[str]:
@@ -170,7 +191,9 @@ def model_name(number: int) -> str:
 def scan_bus(chain: ServoChain, baud_rates: Sequence[int] = USUAL_BAUD_RATES, ids: Sequence[int] = ALL_IDS) -> BusScan:
     """Ping all servos at each of these baud rates, and where a reply is not understood these IDs one by one.
 
-    The port is left at the baud rate that it had. Raises PortLostError, and InputError for a rate that no servo has.
+    If none replies, `OLDER_IDS` are asked in Protocol 1.0, up to the first rate at which one replies, to say what is
+    there. The port is left at the baud rate that it had. Raises PortLostError, and InputError for a rate that no servo
+    has.
     """
     before, scan = chain.port.baud_rate, BusScan()
     try:
@@ -183,6 +206,11 @@ def scan_bus(chain: ServoChain, baud_rates: Sequence[int] = USUAL_BAUD_RATES, id
                 continue
             scan.asked.append(rate)
             _scan_rate(chain, ids, scan)
+        for rate in () if scan.servos else scan.asked:
+            chain.port.setBaudRate(rate)
+            scan.older.extend(_older_servos(chain))
+            if scan.older:
+                break
     finally:
         chain.port.setBaudRate(before)
     return scan
@@ -203,6 +231,23 @@ def _scan_rate(chain: ServoChain, ids: Sequence[int], scan: BusScan) -> None:
         scan.damaged.append(chain.port.baud_rate)
     elif is_noisy and not servos:
         scan.foreign.append(chain.port.baud_rate)
+
+
+def _older_servos(chain: ServoChain) -> list[OlderServo]:
+    """Those that reply in Protocol 1.0; none where a reply comes to any ID, as from an adapter with an echo."""
+    found = []
+    latency_s = chain.port.latency_s
+    chain.port.latency_s = min(latency_s, SHORT_LATENCY_S)
+    try:
+        for number in (NOBODYS_ID, *OLDER_IDS):
+            model_number, result, _ = Protocol1PacketHandler().ping(chain.port, number)
+            if result == COMM_SUCCESS and number == NOBODYS_ID:
+                return []
+            if result == COMM_SUCCESS:
+                found.append(OlderServo(number, model_number, chain.port.baud_rate))
+    finally:
+        chain.port.latency_s = latency_s
+    return found
 
 
 def _one_by_one(chain: ServoChain, ids: Sequence[int]) -> Iterator[DetectedServo]:
