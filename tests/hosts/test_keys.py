@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import stat
+from pathlib import Path
 
 import pytest
 
@@ -64,3 +65,20 @@ def test_a_damaged_list_is_rejected_with_the_line(keys):
         file.write("what is this\n")
     with pytest.raises(HostKeyError, match=":2:"):
         keys.trusted()
+
+
+@pytest.mark.parametrize(
+    "thing", ["a file for the folder", "no folder can be made", "a folder for the pair", "a folder for the trusted"]
+)
+def test_a_folder_of_keys_that_cannot_be_used_is_named(tmp_path, thing):
+    folder = Path("/proc/nowhere/hosts") if thing == "no folder can be made" else tmp_path / "hosts"
+    if thing == "a file for the folder":
+        folder.write_text("")
+    elif thing == "a folder for the pair":
+        (folder / "own.key").mkdir(parents=True)
+        (folder / "own.key").chmod(0o700)
+    elif thing == "a folder for the trusted":
+        (folder / "trusted").mkdir(parents=True)
+    keys = HostKeys(folder)
+    with pytest.raises(HostKeyError, match=str(folder)):
+        keys.trust("other", keys.own().public)

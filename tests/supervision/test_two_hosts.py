@@ -177,6 +177,23 @@ def test_a_host_is_trusted_once_and_a_changed_key_is_rejected(two_hosts):
         assert "0" * 40 in rejected.stderr
 
 
+def test_a_greeting_changes_nothing(two_hosts, tmp_path, monkeypatch):
+    greeting = tmp_path / "ssh"
+    rest = os.environ["PARAMOVE_SSH"]
+    greeting.write_text(f'#!/bin/sh\necho "{"*" * 40}"\nprintf "Welcome $ "\nexec {rest} "$@"\n')
+    greeting.chmod(0o755)
+    monkeypatch.setenv("PARAMOVE_SSH", str(greeting))
+    for words in ("trust", "check"):
+        done = two_hosts.host(words)
+        assert done.returncode == 0, done.stderr
+    assert two_hosts.keys.trusted()["other"] != "*" * 40
+    launcher = two_hosts.here.start("--headless")
+    two_hosts.here.await_happening(launcher, "near", "ready")
+    launcher.send_signal(signal.SIGINT)
+    assert "Welcome" not in shown_by(launcher)
+    assert launcher.returncode == 130
+
+
 def test_a_key_that_begins_like_an_option_is_a_key(two_hosts):
     public = ""
     while not public.startswith("-"):

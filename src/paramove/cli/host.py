@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import socket
-import subprocess
 from typing import Annotated
 
 import typer
 
 from paramove.documents import InputError
 from paramove.hosts import HostKeys
-from paramove.supervision import Agent, HostSettings, release_of, ssh_command
+from paramove.supervision import About, Agent, HostSettings, ask_host, release_of
 from paramove.workspace import Workspace
 
 app = typer.Typer(name="host", help="Trust and check the other computers of a run.", no_args_is_help=True)
@@ -18,7 +17,6 @@ app = typer.Typer(name="host", help="Trust and check the other computers of a ru
 HostArgument = Annotated[str, typer.Argument(metavar="HOST", help="its name for ssh")]
 FolderOption = Annotated[str | None, typer.Option("--folder", help="where paramove is started there, if not at home")]
 CommandOption = Annotated[str, typer.Option("--command", help="how paramove is started there")]
-TIMEOUT_S = 60.0
 
 
 @app.command()
@@ -28,25 +26,25 @@ def trust(host: HostArgument, folder: FolderOption = None, command: CommandOptio
     A key that differs from the pinned one is rejected.
     """
     keys, there = HostKeys(), HostSettings(ssh=host, folder=folder, command=command)
-    new = keys.trust(host, _asked(there, "key").strip())
-    _asked(there, "accept", "--", socket.gethostname(), keys.own().public)  # a key may begin with a hyphen
+    new = keys.trust(host, ask_host(there, "about").key)
+    ask_host(there, "accept", "--", socket.gethostname(), keys.own().public)  # a key may begin with a hyphen
     typer.echo(f"{host} is {'now' if new else 'still'} trusted, and trusts this computer")
 
 
 @app.command()
 def check(host: HostArgument, folder: FolderOption = None, command: CommandOption = "paramove") -> None:
     """Check whether a host can take part in a run: ssh, installation, release and keys."""
-    there = HostSettings(ssh=host, folder=folder, command=command)
-    found, expected = _asked(there, "release").strip(), release_of(Workspace.here())
-    if found != expected:
-        raise InputError(f"{host} has {found}; this computer has {expected}. Install the same on both")
-    typer.echo(f"ssh       {host} replies\nrelease   {found}")
-    key, pinned = _asked(there, "key").strip(), HostKeys().trusted().get(host)
+    found = ask_host(HostSettings(ssh=host, folder=folder, command=command), "about")
+    expected = release_of(Workspace.here())
+    if found.release != expected:
+        raise InputError(f"{host} has {found.release}; this computer has {expected}. Install the same on both")
+    typer.echo(f"ssh       {host} replies\nrelease   {found.release}")
+    pinned = HostKeys().trusted().get(host)
     if pinned is None:
         raise InputError(f"{host} is not trusted yet: paramove host trust {host}")
-    if pinned != key:
-        HostKeys().trust(host, key)  # raises with what to do
-    typer.echo(f"key       {key}, as pinned")
+    if pinned != found.key:
+        HostKeys().trust(host, found.key)  # raises with what to do
+    typer.echo(f"key       {found.key}, as pinned")
 
 
 @app.command()
@@ -59,6 +57,7 @@ def key() -> None:
 def accept(name: Annotated[str, typer.Argument()], public: Annotated[str, typer.Argument(metavar="KEY")]) -> None:
     """Pin the public key of another computer on this one; `trust` does that over ssh."""
     HostKeys().trust(name, public)
+    about()
 
 
 @app.command()
@@ -68,25 +67,13 @@ def release() -> None:
 
 
 @app.command(hidden=True)
+def about() -> None:
+    """Print release and public key of this computer for the command on another one, which skips all other lines."""
+    line = About(release=release_of(Workspace.here()), key=HostKeys().own().public).line()
+    typer.echo(f"\n{line.decode()}")
+
+
+@app.command(hidden=True)
 def agent() -> None:
-    """Run this computer's nodes of a run; started by the launcher over ssh, with which it exchanges lines of JSON."""
+    """Run this computer's nodes of a run; started by the launcher over ssh, with which it exchanges messages."""
     raise typer.Exit(0 if Agent(Workspace.here()).run() else 1)
-
-
-def _asked(host: HostSettings, *words: str) -> str:
-    """Output of `paramove host` there; raises InputError with what ssh or it prints."""
-    try:
-        answer = subprocess.run(
-            ssh_command(host, "host", *words),
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=TIMEOUT_S,
-            check=False,
-        )
-    except subprocess.TimeoutExpired as error:
-        raise InputError(f"{host.ssh} gives no answer within {TIMEOUT_S:g} s: check network and ssh") from error
-    if answer.returncode:
-        lines = [line.strip(" │") for line in answer.stderr.splitlines() if any(map(str.isalnum, line))]
-        raise InputError(f"{host.ssh}: {lines[-1] if lines else f'exit code {answer.returncode}'}")
-    return answer.stdout

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -12,9 +12,9 @@ from paramove.bus import inspection
 from paramove.cli import completions
 from paramove.cli.bus_options import DomainOption, bus_folder, show
 from paramove.cli.output import JsonOption, ended
-from paramove.documents import exit_codes
+from paramove.documents import exit_codes, nearest
 from paramove.msgs.node_status_pb2 import NodeStatus
-from paramove.supervision import NoRunError, ask
+from paramove.supervision import NodeRow, NoRunError, Request, ask
 
 app = typer.Typer(name="node", help="Look at the nodes on the bus; stop, start or restart one.", no_args_is_help=True)
 
@@ -32,7 +32,7 @@ def list_nodes(
     """List the nodes: state, their own status, messages, losses, seconds spent, restarts and last end."""
     folder = bus_folder(domain)
     try:
-        supervised = {row["node"]: row for row in ask(folder, {"do": "list"})["nodes"]}
+        supervised = {row.node: row for row in ask(folder, Request(do="list")).nodes}
     except NoRunError:  # nodes that were started one by one
         supervised = {}
     statuses = inspection.statuses(folder, seconds)
@@ -61,25 +61,28 @@ def restart(name: NameArgument, domain: DomainOption = None, wait_s: WaitOption 
     _do("restart", name, bus_folder(domain), wait_s)
 
 
-def _do(action: str, name: str, folder: Path, wait_s: float) -> None:
+def _do(action: Literal["stop", "start", "restart"], name: str, folder: Path, wait_s: float) -> None:
     """Sends a request to the supervisor and follows its result."""
     try:
         before = _supervised(folder, name)
-        answer = ask(folder, {"do": action, "node": name})
-        if not answer["ok"]:
-            raise ended(answer["sentence"], exit_codes.FAILURE)
-        row = _followed(folder, name, action, wait_s, None if action == "stop" else (before or {}).get("pid"))
+        if before is None:
+            known = [row.node for row in ask(folder, Request(do="list")).nodes]
+            raise ended(f"there is no node '{name}'; {nearest(name, known)}", exit_codes.FAILURE)
+        answer = ask(folder, Request(do=action, node=name))
+        if not answer.ok:
+            raise ended(answer.sentence, exit_codes.FAILURE)
+        row = _followed(folder, name, action, wait_s, None if action == "stop" else before.pid)
     except NoRunError as error:
         raise ended(str(error), exit_codes.FAILURE) from None
     if row is None:
         typer.echo(f"{name}: {action} is done, and the run has ended with it")
         return
-    typer.echo(f"{name} is {row['state']}: {row['sentence']}")
-    if row["state"] not in (("stopped",) if action == "stop" else ("ready", "degraded")):
+    typer.echo(f"{name} is {row.state}: {row.sentence}")
+    if row.state not in (("stopped",) if action == "stop" else ("ready", "degraded")):
         raise typer.Exit(exit_codes.FAILURE)
 
 
-def _followed(folder: Path, name: str, action: str, wait_s: float, old_pid: int | None) -> dict[str, Any] | None:
+def _followed(folder: Path, name: str, action: str, wait_s: float, old_pid: int | None) -> NodeRow | None:
     """The node's row once the action has come to its end or the timeout is over; None if the run has ended."""
     ends = ("stopped", "given up") if action == "stop" else ("ready", "degraded", "failed", "given up", "restarting")
     end_s = time.monotonic() + wait_s
@@ -90,34 +93,32 @@ def _followed(folder: Path, name: str, action: str, wait_s: float, old_pid: int 
             return None
         if row is None or time.monotonic() > end_s:
             return row
-        if row["state"] in ends and (row["pid"] is None or row["pid"] != old_pid):
+        if row.state in ends and (row.pid is None or row.pid != old_pid):
             return row
         time.sleep(LOOK_PERIOD_S)
 
 
-def _supervised(folder: Path, name: str) -> dict[str, Any] | None:
-    rows: list[dict[str, Any]] = ask(folder, {"do": "list"})["nodes"]
-    return next((row for row in rows if row["node"] == name), None)
+def _supervised(folder: Path, name: str) -> NodeRow | None:
+    return next((row for row in ask(folder, Request(do="list")).nodes if row.node == name), None)
 
 
 def _row(
-    node: str, status: NodeStatus | None, alive: bool, supervised: dict[str, Any] | None, seconds: float
+    node: str, status: NodeStatus | None, alive: bool, supervised: NodeRow | None, seconds: float
 ) -> dict[str, Any]:
     """A line of the list, from the node's status and its supervisor."""
     if status is None:
         status = NodeStatus(detail=f"alive, did not answer within {seconds:g} s" if alive else "")
     state = NodeStatus.State.Name(status.state).removeprefix("STATE_").lower() if status.state else "busy"
-    known = supervised or {"state": state, "sentence": "", "restarts": None, "exit_reason": ""}
     return {
         "node": node,
-        "state": known["state"],
-        "pid": status.pid or known.get("pid"),
+        "state": supervised.state if supervised else state,
+        "pid": status.pid or (supervised.pid if supervised else None),
         "processed": status.processed,
         "seconds": round(status.processing_seconds, 3),
         "received": sum(count.messages for count in status.received),
         "lost": sum(count.lost for count in status.received),
         "refused": sum(count.rejected for count in status.received),
-        "restarts": known["restarts"],
-        "last_end": known["exit_reason"],
-        "sentence": status.detail or known["sentence"],
+        "restarts": supervised.restarts if supervised else None,
+        "last_end": supervised.exit_reason if supervised else "",
+        "sentence": status.detail or (supervised.sentence if supervised else ""),
     }

@@ -29,7 +29,15 @@ class Message(BaseModel):
 
 
 class MessageError(ValueError):
-    """Something that came is no message that may come; the text is printable and says what it is."""
+    """Something that came is no message that may come; the text is printable and says why.
+
+    Attributes:
+        content: How it begins, printable.
+    """
+
+    def __init__(self, reason: str, content: bytes = b"") -> None:
+        super().__init__(printable(reason)[:LONGEST_TEXT])
+        self.content = printable(content[:200].decode("utf-8", "replace"))[:80]
 
 
 def _printable(value: Any) -> Any:
@@ -66,13 +74,13 @@ class MessageReader(Generic[Kind]):
     def read(self, content: bytes) -> Kind:
         """The message; raises MessageError for anything else."""
         if len(content) > self.max_bytes:
-            raise MessageError(f"{len(content)} bytes, allowed are {self.max_bytes}")
+            raise MessageError(f"{len(content)} bytes, allowed are {self.max_bytes}", content)
         if (depth := _depth(content)) > MAX_DEPTH:
-            raise MessageError(f"nested {depth} deep, allowed are {MAX_DEPTH}: {content!r:.60}")
+            raise MessageError(f"nested {depth} deep, allowed are {MAX_DEPTH}", content)
         try:
             return self._adapter.validate_json(content)
         except ValidationError as error:
-            raise MessageError(printable(findings(error))[:LONGEST_TEXT]) from error
+            raise MessageError(findings(error), content) from error
 
 
 def _depth(content: bytes) -> int:

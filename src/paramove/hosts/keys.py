@@ -7,14 +7,20 @@ import re
 import stat
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import zmq
 from platformdirs import user_config_path
+from pydantic import Field
 
-from paramove.documents import InputError, replacing
+from paramove.documents import InputError, read_text, replacing
 
 OWN, TRUSTED = "own.key", "trusted"
-_KEY = re.compile(r"[0-9a-zA-Z.\-:+=^!/*?&<>()\[\]{}@%$#]{40}")  # Z85
+_Z85 = r"^[0-9a-zA-Z.\-:+=^!/*?&<>()\[\]{}@%$#]{40}$"
+_KEY = re.compile(_Z85)
+MAX_BYTES = 100_000
+PublicKey = Annotated[str, Field(pattern=_Z85)]
+"""A public key, Z85 text."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,62}")
 
 
@@ -43,16 +49,14 @@ class HostKeys:
     def own(self) -> KeyPair:
         """This host's pair, made at its first use. Raises HostKeyError if others can read it, or it is damaged."""
         path = self.folder / OWN
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if not path.exists():
+        if not _is_there(path):
             public, secret = (key.decode("ascii") for key in zmq.curve_keypair())
-            with replacing(path, 0o600) as unfinished:
-                unfinished.write_text(f"{public}\n{secret}\n", encoding="ascii")
+            self._write(path, f"{public}\n{secret}\n")
         found = path.stat()
         if found.st_mode & 0o077 or found.st_uid != os.geteuid():
             mode = stat.S_IMODE(found.st_mode)
             raise HostKeyError(f"{path} can be read by others (mode {mode:04o}): chmod 600 {path}")
-        lines = path.read_text(encoding="ascii", errors="replace").split()
+        lines = read_text(path, "pair of keys", HostKeyError, MAX_BYTES).split()
         if len(lines) != 2 or not all(map(_KEY.fullmatch, lines)):
             raise HostKeyError(f"{path} holds no pair of keys: remove it, and trust the hosts again")
         return KeyPair(*lines)
@@ -60,10 +64,9 @@ class HostKeys:
     def trusted(self) -> dict[str, str]:
         """Name -> public key of the hosts that this user trusts. Raises HostKeyError if the file is damaged."""
         path = self.folder / TRUSTED
-        try:
-            lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-        except FileNotFoundError:
+        if not _is_there(path):
             return {}
+        lines = read_text(path, "file of trusted hosts", HostKeyError, MAX_BYTES).splitlines()
         known = {}
         for number, line in enumerate(lines, 1):
             name, _, key = line.partition(" ")
@@ -87,8 +90,27 @@ class HostKeys:
             )
         if name in known:
             return False
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         lines = [f"{one} {its}" for one, its in {**known, name: key}.items()]
-        with replacing(self.folder / TRUSTED, 0o600) as unfinished:
-            unfinished.write_text("\n".join(lines) + "\n", encoding="ascii")
+        self._write(self.folder / TRUSTED, "\n".join(lines) + "\n")
         return True
+
+    def _write(self, path: Path, text: str) -> None:
+        try:
+            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            with replacing(path, 0o600) as unfinished:
+                unfinished.write_text(text, encoding="ascii")
+        except OSError as error:
+            raise HostKeyError(
+                f"{path} cannot be written: {error.strerror}; let XDG_CONFIG_HOME be a folder that you may write to"
+            ) from error
+
+
+def _is_there(path: Path) -> bool:
+    """Whether there is a file; raises HostKeyError where nobody may look."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError as error:
+        raise HostKeyError(f"{path} cannot be read: {error.strerror}") from error
+    return True

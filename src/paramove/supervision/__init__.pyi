@@ -4,7 +4,6 @@ from .agent import release_of as release_of
 from .application import check as check
 from .control import NoRunError as NoRunError
 from .control import ask as ask
-from .distribution import ssh_command as ssh_command
 from .domain import LONGEST_FOLDER as LONGEST_FOLDER
 from .domain import DomainError as DomainError
 from .domain import DomainNameError as DomainNameError
@@ -31,9 +30,13 @@ from .launch_schema import HostSettings as HostSettings
 from .launch_schema import LaunchFile as LaunchFile
 from .launch_schema import editor_schema as editor_schema
 from .launch_schema import schema_as_text as schema_as_text
+from .messages import About as About
+from .messages import NodeRow as NodeRow
+from .messages import Request as Request
 from .needs import MissingFile as MissingFile
 from .needs import missing_files as missing_files
 from .queued_output import QueuedOutput as QueuedOutput
+from .remote_host import ask_host as ask_host
 from .run_folder import RunFolder as RunFolder
 from .run_logs import LEVELS as LEVELS
 from .run_logs import SUPERVISOR as SUPERVISOR

@@ -1,30 +1,16 @@
 """One host's part of a run that another host has launched: starts, ends and reports its nodes on request.
 
-It reads and writes lines of JSON by its standard input and output, which the launcher's ssh connects. Where the
-connection ends, or is silent for `SILENT_S`, it ends its nodes by itself, the arm first. It begins with a line. From
-the launcher:
-
-    {"begin": {…}}                     the launch file, the domain, the release, the age of the run; once, on that line
-    {"start": NODE}                    the answer is "started", or "failed"
-    {"end": NODE}, {"kill": NODE}      SIGTERM, SIGKILL
-    {}                                 it is alive; twice a second
-
-To the launcher:
-
-    {"rejected": REASON}               another release, a taken domain …; it ends
-    {"ready": FOLDER}                  the folder of this part of the run
-    {"started": NODE, "pid": PID}, {"failed": NODE, "reason": TEXT}
-    {"ended": NODE, "code": CODE}, {"halted": NODE, "is": BOOL}
-    {"log": NODE, "text": TEXT}        further output of a node
-    {}                                 it is alive
+It reads and writes messages (see `messages.py`) by its standard input and output, which the launcher's ssh connects.
+Where the connection ends, or is silent for `SILENT_S`, it ends its nodes by itself, the arm first: it never waits for
+the launcher to take what it sends, so that its own clock decides. It sends first: then a shell's start-up file has
+printed what it prints, and the launcher begins.
 """
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import datetime
-import json
-import os
 import select
 import signal
 import sys
@@ -32,22 +18,36 @@ import time
 from pathlib import Path
 from typing import Any
 
-from paramove.documents import Document
+from paramove.documents import Document, MessageError, printable
 from paramove.source_code import code_digest
-from paramove.supervision.control import json_object
+from paramove.supervision.channel import Channel
 from paramove.supervision.domain import DomainError, held_domain
 from paramove.supervision.environment import LimitError, allow_open_files
 from paramove.supervision.launch_file import Launch
-from paramove.supervision.launch_schema import LaunchFile
+from paramove.supervision.messages import (
+    TO_AGENT,
+    Alive,
+    Begin,
+    End,
+    Ended,
+    Failed,
+    Halted,
+    Kill,
+    Log,
+    Ready,
+    Rejected,
+    Start,
+    Started,
+)
 from paramove.supervision.processes import Guard, SupervisedProcess, node_process
-from paramove.supervision.queued_output import ignored_by_nohup
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.stopping import stop_in_waves
 from paramove.workspace import Workspace
 
 ALIVE_S, SILENT_S = 0.5, 3.0
-MAX_LINE = 4_000_000
 _PERIOD_S = 0.05
+_LAST_S = 1.0
+"""How long it waits at its end for the launcher to take the last messages."""
 _LOG_BYTES = 60_000
 _BEHIND = ("paramove.bus.node", "paramove.hosts.relay", "paramove.supervision.agent")
 
@@ -59,73 +59,70 @@ def release_of(workspace: Workspace) -> str:
     return f"{__version__}, code {code_digest(*_BEHIND)}, workspace {workspace.digest}"
 
 
-class Lines:
-    """Lines of JSON from a descriptor that is read without waiting.
+class _LogTail:
+    """What has been added to a log since it was read last."""
 
-    Attributes:
-        ended: Whether the other side has closed it, or sent what is no such line.
-    """
+    def __init__(self, path: Path) -> None:
+        self._path, self._at = path, 0
+        self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
 
-    def __init__(self, descriptor: int) -> None:
-        self.descriptor, self.ended = descriptor, False
-        self._begun = b""
-        os.set_blocking(descriptor, False)
-
-    def read(self) -> list[dict[str, Any]]:
-        """Those that have come in."""
-        with contextlib.suppress(BlockingIOError):
-            while not self.ended:
-                part = os.read(self.descriptor, 65_536)
-                self._begun += part
-                self.ended |= not part or len(self._begun) > MAX_LINE
-        *lines, self._begun = self._begun.split(b"\n")
-        found = []
-        for content in map(json_object, lines):
-            if content is None:
-                self.ended = True
-                break
-            found.append(content)
-        return found
+    def further(self) -> str:
+        """The next part of it, "" if there is none; a character may lie in two parts of the file."""
+        with contextlib.suppress(FileNotFoundError), self._path.open("rb") as file:
+            file.seek(self._at)
+            content = file.read(_LOG_BYTES)
+            self._at = file.tell()
+            return self._decoder.decode(content)
+        return ""
 
 
 class Agent:
-    """See the head of this module. `run` returns once its part of the run has ended."""
+    """See the head of this module. `run` returns once its part of the run has ended.
 
-    def __init__(self, workspace: Workspace) -> None:
+    Args:
+        workspace: Where nodes are found.
+        reads, writes: Descriptors of the connection; default: standard input and output.
+    """
+
+    def __init__(self, workspace: Workspace, reads: int | None = None, writes: int | None = None) -> None:
         self._workspace = workspace
-        self._lines = Lines(sys.stdin.fileno())
+        reads = sys.stdin.fileno() if reads is None else reads
+        writes = sys.stdout.fileno() if writes is None else writes
+        self._channel: Channel[Any] = Channel(reads, writes, TO_AGENT)
         self._processes: dict[str, SupervisedProcess] = {}
-        self._logs: dict[str, int] = {}
+        self._logs: dict[str, _LogTail] = {}
         self._ends = False
         self._latest_s = self._alive_due_s = time.monotonic()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            if not ignored_by_nohup(number):
-                signal.signal(number, self._end)
+            signal.signal(number, self._end)
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
     def run(self) -> bool:
         """Whether it could begin."""
-        self._say()
+        self._channel.send_line_break()
+        self._channel.send(Alive())
         begin = self._first()
-        if begin is None:
-            return False
-        begun_ns = time.monotonic_ns() - int(begin["age_ns"])
+        has_begun = begin is not None and self._run(begin)
+        self._send_the_rest()
+        return has_begun
+
+    def _run(self, begin: Begin) -> bool:
+        begun_ns = time.monotonic_ns() - begin.age_ns
         release = release_of(self._workspace)
-        if begin["release"] != release:
-            self._say(rejected=f"it has {release}; the launcher has {begin['release']}. Install the same on both")
-            return False
-        file = LaunchFile.model_validate(begin["launch"])
-        launch = Launch(begin["name"], (), file, Document(begin["launch"]))
+        if begin.release != release:
+            return self._reject(f"it has {release}; the launcher has {begin.release}. Install the same on both")
+        file = begin.launch
+        launch = Launch(begin.name, (), file, Document(file.model_dump(mode="json")))
         try:
             allow_open_files()
-            with held_domain(begin["domain"], f"paramove host agent for {begin['launcher']}") as domain:
+            with held_domain(begin.domain, f"paramove host agent for {begin.launcher}") as domain:
                 runs = self._workspace.root / "runs"
                 self._folder = RunFolder.create(runs, datetime.datetime.now().astimezone())
                 self._folder.begun_ns = begun_ns
                 self._folder.write_effective(launch)
-                self._folder.write_configs(launch, domain.folder, domain.truth_folder, begin["clock"], begin["host"])
-                self._say(ready=str(self._folder.path))
-                self._file = file
+                self._folder.write_configs(launch, domain.folder, domain.truth_folder, begin.clock, begin.host)
+                self._channel.send(Ready(folder=printable(str(self._folder.path))))
+                self._nodes = {name: node for name, node in file.nodes.items() if node.host == begin.host}
                 with Guard() as self._guard:
                     self._serve()
                     stop_in_waves(
@@ -136,49 +133,62 @@ class Agent:
                         wait=self._wait,
                     )
         except (DomainError, LimitError, OSError) as error:
-            self._say(rejected=str(error))
-            return False
+            return self._reject(str(error))
         return True
+
+    def _reject(self, reason: str) -> bool:
+        self._channel.send(Rejected(reason=printable(reason)))
+        return False
 
     def _end(self, *_: object) -> None:
         self._ends = True
 
-    def _first(self) -> dict[str, Any] | None:
-        while not (self._ends or self._lines.ended):
-            select.select([self._lines.descriptor], [], [], SILENT_S)
-            for line in self._lines.read():
-                begin = line.get("begin")
-                return begin if isinstance(begin, dict) else None
+    def _first(self) -> Begin | None:
+        while not (self._ends or self._channel.ended):
+            select.select([self._channel.descriptor], [], [], SILENT_S)
+            for message in self._channel.read():
+                if isinstance(message, Begin):
+                    return message
+                self._reject(f"the run was expected first, found {message}")
+                return None
         return None
 
     def _serve(self) -> None:
         """Does what is requested until the connection, or the run, has ended."""
         self._latest_s = time.monotonic()
-        while not (self._ends or self._lines.ended) and time.monotonic() - self._latest_s < SILENT_S:
+        while not (self._ends or self._channel.ended) and time.monotonic() - self._latest_s < SILENT_S:
             self._wait()
-            for line in self._lines.read():
-                self._latest_s = time.monotonic()
-                if (name := line.get("start")) in self._file.nodes:
-                    self._start(name)
-                self._terminate(line.get("end", ""))
-                self._kill(line.get("kill", ""))
+            for message in self._channel.read():
+                if not isinstance(message, MessageError):
+                    self._latest_s = time.monotonic()
+                    self._take(message)
+
+    def _take(self, message: Any) -> None:
+        match message:
+            case Start(node=name) if name in self._nodes:
+                self._start(name)
+            case End(node=name):
+                self._terminate(name)
+            case Kill(node=name):
+                self._kill(name)
 
     def _wait(self) -> None:
-        """Waits a moment for a line, or an end, and reports what has happened."""
-        waited: list[int] = [] if self._lines.ended else [self._lines.descriptor]
-        select.select([*waited, *(one.descriptor for one in self._processes.values())], [], [], _PERIOD_S)
+        """Waits a moment for a message, or an end, and reports what has happened."""
+        waited: list[int] = [] if self._channel.ended else [self._channel.descriptor]
+        select.select([*waited, *(process.descriptor for process in self._processes.values())], [], [], _PERIOD_S)
         self._report()
 
     def _start(self, name: str) -> None:
         if name in self._processes:
             return
         try:
-            process = node_process(name, self._file.nodes[name], self._folder, self._workspace, self._guard)
+            process = node_process(name, self._nodes[name], self._folder, self._workspace, self._guard)
         except OSError as error:
-            self._say(failed=name, reason=error.strerror or str(error))
+            self._channel.send(Failed(node=name, reason=printable(error.strerror or str(error))))
             return
         self._processes[name] = process
-        self._say(started=name, pid=process.pid)
+        self._logs.setdefault(name, _LogTail(self._folder.log(name)))
+        self._channel.send(Started(node=name, pid=process.pid))
 
     def _terminate(self, name: str) -> None:
         if name in self._processes:
@@ -190,27 +200,32 @@ class Agent:
 
     def _report(self) -> None:
         """Ends, stops (SIGSTOP), output, and that it is alive."""
+        ended = {}
         for name, process in list(self._processes.items()):
             code = process.ended()
-            if code is None and (halted := process.halted()) is not None:
-                self._say(halted=name, **{"is": halted})
-            self._send_log(name)
             if code is not None:
+                ended[name] = code
                 del self._processes[name]
-                self._say(ended=name, code=code)
-        if time.monotonic() >= self._alive_due_s:
+            elif (halted := process.halted()) is not None:
+                self._channel.send(Halted(node=name, is_halted=halted))
+        self._send_logs()
+        for name, code in ended.items():
+            self._channel.send(Ended(node=name, code=code))
+        if time.monotonic() >= self._alive_due_s and not self._channel.is_behind:
             self._alive_due_s = time.monotonic() + ALIVE_S
-            self._say()
+            self._channel.send(Alive())
+        self._channel.flush()
 
-    def _send_log(self, name: str) -> None:
-        path: Path = self._folder.log(name)
-        with contextlib.suppress(FileNotFoundError), path.open("rb") as file:
-            file.seek(self._logs.get(name, 0))
-            if text := file.read(_LOG_BYTES):
-                self._logs[name] = file.tell()
-                self._say(log=name, text=text.decode("utf-8", "replace"))
+    def _send_logs(self) -> None:
+        """Further output, as long as the launcher takes it; the rest stays in the files here."""
+        for name, log in self._logs.items():
+            if self._channel.is_behind:
+                return
+            if text := log.further():
+                self._channel.send(Log(node=name, text=text))
 
-    def _say(self, **content: Any) -> None:
-        with contextlib.suppress(OSError):  # nobody reads it any more
-            sys.stdout.write(json.dumps(content) + "\n")
-            sys.stdout.flush()
+    def _send_the_rest(self) -> None:
+        until_s = time.monotonic() + _LAST_S
+        while self._channel.is_behind and time.monotonic() < until_s:
+            select.select([], [], [], _PERIOD_S)
+            self._channel.flush()

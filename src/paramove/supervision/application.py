@@ -12,13 +12,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from paramove.documents import raise_any
+from paramove.documents import printable, raise_any
 from paramove.supervision.agent import release_of
 from paramove.supervision.distribution import distributed
 from paramove.supervision.domain import held_domain
 from paramove.supervision.environment import DEFAULT_DOMAIN, allow_open_files
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
+from paramove.supervision.messages import Begin
 from paramove.supervision.parameters import wrong_parameters
 from paramove.supervision.remote_host import RemoteHost
 from paramove.supervision.run_folder import RunFolder
@@ -102,18 +103,20 @@ def _remote_hosts(
     """Connects to the other hosts; raises InputError for one that does not take part."""
     if not launch.file.hosts:
         return {}
-    begin = {
-        "launch": launch.file.model_dump(mode="json"),
-        "name": launch.name,
-        "domain": domain,
-        "clock": clock,
-        "launcher": socket.gethostname(),
-        "release": release_of(workspace),
-    }
+    release = release_of(workspace)
     hosts = {}
     for name, settings in launch.file.hosts.items():
         if settings.ssh is not None:
-            hosts[name] = RemoteHost(name, settings, begin, folder)
+            begin = Begin(
+                launch=launch.file,
+                name=printable(launch.name),
+                domain=domain,
+                clock=clock,
+                launcher=printable(socket.gethostname()),
+                release=release,
+                host=name,
+            )
+            hosts[name] = RemoteHost(settings, begin, folder)
             connected.callback(hosts[name].close)
     return hosts
 

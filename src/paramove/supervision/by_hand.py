@@ -9,27 +9,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import Any
 
 from paramove.documents import nearest
-from paramove.supervision.control import Answer
+from paramove.supervision.messages import Answer, NodeRow, Request
 from paramove.supervision.supervised_node import ENDED, State, SupervisedNode
 
 
-def answer(nodes: Mapping[str, SupervisedNode], request: Mapping[str, Any], ending: bool) -> Answer:
+def answer(nodes: Mapping[str, SupervisedNode], request: Request, ending: bool) -> Answer:
     """Executes a request (`list`, `stop`, `start`, `restart`) or answers why it is rejected.
 
     Args:
         nodes: Of the run.
-        request: `do` and, but for `list`, `node`.
+        request: What to do, and with which node.
         ending: Whether the run is being ended.
     """
-    do, name = request.get("do"), request.get("node")
+    do, name = request.do, request.node
     if do == "list":
-        return {"ok": True, "sentence": "", "nodes": [_row(node) for node in nodes.values()]}
-    if do not in _ACTIONS:
-        return _rejected(f"unknown request '{do}'; there are: list, {', '.join(_ACTIONS)}")
-    if not isinstance(name, str) or name not in nodes:
+        return Answer(ok=True, sentence="", nodes=[_row(node) for node in nodes.values()])
+    if name is None or name not in nodes:
         return _rejected(f"there is no node '{name}'; {nearest(str(name), nodes)}")
     if ending:
         return _rejected("the run is ending; launch it again")
@@ -37,7 +34,7 @@ def answer(nodes: Mapping[str, SupervisedNode], request: Mapping[str, Any], endi
     rejection = _ACTIONS[do](node)
     if rejection:
         return _rejected(f"{name} {rejection}")
-    return {"ok": True, "sentence": f"{name}: {do} by hand", "node": _row(node)}
+    return Answer(ok=True, sentence=f"{name}: {do} by hand", nodes=[_row(node)])
 
 
 def _stop(node: SupervisedNode) -> str:
@@ -79,15 +76,15 @@ def _not_restartable(node: SupervisedNode) -> str:
 
 
 def _rejected(message: str) -> Answer:
-    return {"ok": False, "sentence": message}
+    return Answer(ok=False, sentence=message)
 
 
-def _row(node: SupervisedNode) -> dict[str, Any]:
-    return {
-        "node": node.name,
-        "state": node.state.value,
-        "sentence": node.detail,
-        "pid": node.pid if node.is_running else None,
-        "restarts": node.restarts,
-        "exit_reason": node.exit_reason,
-    }
+def _row(node: SupervisedNode) -> NodeRow:
+    return NodeRow(
+        node=node.name,
+        state=node.state.value,
+        sentence=node.detail,
+        pid=node.pid if node.is_running else None,
+        restarts=node.restarts,
+        exit_reason=node.exit_reason,
+    )

@@ -1,32 +1,60 @@
 """One node of a running application stopped, started or restarted by hand: the socket `control` in the bus folder.
 
-A request is a line of JSON, `{"do": "restart", "node": "camera"}`, and so is the answer: `{"ok": true, "sentence": …}`
-or `{"ok": false, "sentence": …}`. The folder belongs to the user alone (0700), so other users cannot send requests.
+A client sends one `Request` and gets one `Answer` (see `messages.py`). The folder belongs to the user alone (0700), so
+other users cannot send requests.
 """
 
 from __future__ import annotations
 
 import contextlib
-import json
 import os
+import select
 import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from paramove.bus import socket_path
+from paramove.documents import MessageError, printable
+from paramove.supervision.channel import Channel
+from paramove.supervision.messages import ANSWERS, REQUESTS, Answer, Request
 
 NAME = "control"
-LONGEST_REQUEST = 4096
 TIMEOUT_S = 2.0
-"""A client that has not finished its request by then is disconnected."""
-
-Answer = dict[str, Any]
+"""A client that has not finished its request, or taken its answer, by then is disconnected."""
+ANSWER_S = 5.0
+MOST_CLIENTS = 32
+"""At once; further ones are disconnected."""
 
 
 class NoRunError(RuntimeError):
     """No running application was found; the text has the folder that was searched."""
+
+
+class _Client:
+    """One connection: a request, then an answer."""
+
+    def __init__(self, connection: socket.socket, answer: Callable[[Request], Answer]) -> None:
+        self.connection = connection
+        self._answer = answer
+        self._channel = Channel(connection.fileno(), connection.fileno(), REQUESTS)
+        self._until_s = time.monotonic() + TIMEOUT_S
+        self._is_answered = False
+
+    def is_done(self) -> bool:
+        """Reads and answers as far as that needs no waiting; whether nothing is left to be done."""
+        for request in self._channel.read():
+            if self._is_answered:
+                break
+            self._is_answered = True
+            if isinstance(request, MessageError):
+                self._channel.send(Answer(ok=False, sentence=printable(f"no request: {request}")))
+            else:
+                self._channel.send(self._answer(request))
+        self._channel.flush()
+        is_over = self._is_answered and not self._channel.is_behind
+        return is_over or self._channel.ended or time.monotonic() > self._until_s
 
 
 class ControlServer:
@@ -37,10 +65,10 @@ class ControlServer:
         answer: Gets each request and returns the answer.
     """
 
-    def __init__(self, folder: Path, answer: Callable[[dict[str, Any]], Answer]) -> None:
+    def __init__(self, folder: Path, answer: Callable[[Request], Answer]) -> None:
         self._path = socket_path(folder, NAME)
         self._answer = answer
-        self._clients: dict[socket.socket, tuple[float, bytearray]] = {}
+        self._clients: list[_Client] = []
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK | socket.SOCK_CLOEXEC)
         self._path.unlink(missing_ok=True)
         self._socket.bind(os.fspath(self._path))
@@ -51,72 +79,52 @@ class ControlServer:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for client in (*self._clients, self._socket):
-            client.close()
+        for client in self._clients:
+            client.connection.close()
+        self._socket.close()
         self._path.unlink(missing_ok=True)
 
     @property
     def descriptors(self) -> list[int]:
         """To be polled for reading."""
-        return [self._socket.fileno(), *(client.fileno() for client in self._clients)]
+        return [self._socket.fileno(), *(client.connection.fileno() for client in self._clients)]
 
     def serve(self) -> None:
         """Answers what has come in."""
         with contextlib.suppress(OSError):  # no client, or one that has disconnected
             while True:
-                client, _ = self._socket.accept()
-                client.setblocking(False)
-                self._clients[client] = (time.monotonic(), bytearray())
-        for client in list(self._clients):
-            if self._is_done(client):
-                del self._clients[client]
-                client.close()
-
-    def _is_done(self, client: socket.socket) -> bool:
-        """Reads from a client; answers a whole line; returns whether the client is done."""
-        since_s, received = self._clients[client]
-        try:
-            chunk = client.recv(LONGEST_REQUEST)
-            received += chunk
-            line, newline, _ = received.partition(b"\n")
-            if newline:
-                client.sendall(json.dumps(self._answer_to(bytes(line))).encode() + b"\n")
-            return bool(newline) or not chunk or len(received) > LONGEST_REQUEST
-        except BlockingIOError:
-            return time.monotonic() > since_s + TIMEOUT_S
-        except OSError:
-            return True
-
-    def _answer_to(self, line: bytes) -> Answer:
-        request = json_object(line)
-        if request is None:
-            return {"ok": False, "sentence": "a request is an object in JSON on one line"}
-        return self._answer(request)
+                connection, _ = self._socket.accept()
+                if len(self._clients) < MOST_CLIENTS:
+                    self._clients.append(_Client(connection, self._answer))
+                else:
+                    connection.close()
+        left = []
+        for client in self._clients:
+            if client.is_done():
+                client.connection.close()
+            else:
+                left.append(client)
+        self._clients = left
 
 
-def json_object(line: bytes) -> dict[str, Any] | None:
-    """The object that a line of JSON holds; None if it holds anything else."""
-    try:
-        content = json.loads(line)
-    except ValueError:
-        return None
-    return content if isinstance(content, dict) else None
-
-
-def ask(folder: Path, request: dict[str, Any]) -> Answer:
+def ask(folder: Path, request: Request) -> Answer:
     """Sends a request to the supervisor of a bus folder; raises NoRunError if there is none or it does not answer."""
     nothing_runs = f"no application is running at {folder}; start one with `paramove launch`"
-    try:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
-            client.settimeout(5.0)
+    until_s = time.monotonic() + ANSWER_S
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
+        try:
+            client.settimeout(ANSWER_S)
             client.connect(os.fspath(socket_path(folder, NAME)))
-            client.sendall(json.dumps(request).encode() + b"\n")
-            line = client.makefile("rb").readline()
-    except TimeoutError as error:
-        raise NoRunError(f"the launcher at {folder} does not answer within 5 s; it hangs or is stopped") from error
-    except OSError as error:
-        raise NoRunError(nothing_runs) from error
-    if not line:
-        raise NoRunError(nothing_runs)
-    answer: Answer = json.loads(line)
-    return answer
+        except OSError as error:
+            raise NoRunError(nothing_runs) from error
+        channel = Channel(client.fileno(), client.fileno(), ANSWERS)
+        channel.send(request)
+        while time.monotonic() < until_s:
+            select.select([client], [], [], max(0.0, until_s - time.monotonic()))
+            for answer in channel.read():
+                if isinstance(answer, MessageError):
+                    raise NoRunError(f"the launcher at {folder} answers what this release cannot read: {answer}")
+                return answer
+            if channel.ended:
+                raise NoRunError(nothing_runs)
+    raise NoRunError(f"the launcher at {folder} does not answer within {ANSWER_S:g} s; it hangs or is stopped")

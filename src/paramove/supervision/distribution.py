@@ -37,7 +37,10 @@ def ssh_command(host: HostSettings, *words: str) -> list[str]:
     if host.folder is not None:
         there = f"cd {shlex.quote(host.folder)} && {there}"
     assert host.ssh is not None
-    return [*(shlex.split(program) if program else SSH), host.ssh, there]
+    try:
+        return [*(shlex.split(program) if program else SSH), host.ssh, there]
+    except ValueError as error:
+        raise InputError(f"PARAMOVE_SSH is {program!r}, which is no command: {error}") from error
 
 
 def on_bus(launch: Launch, node: str, topic: Topic) -> str:

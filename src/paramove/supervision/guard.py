@@ -1,8 +1,8 @@
-"""Ends the nodes of a launcher that died without ending them. Run as a file by the launcher, with nothing imported.
+"""Ends the nodes of a launcher that died without ending them.
 
 Each node gets SIGTERM from the kernel when the launcher dies (PR_SET_PDEATHSIG); this process sends SIGKILL to the
-process groups that outlive it. It reads lines `+<group>` and `-<group>` from a pipe whose other end the launcher holds,
-and acts when that end closes, which the kernel does however the launcher ended.
+process groups that outlive it. It reads a `Watched` for each change from a pipe whose other end the launcher holds, and
+acts when that end closes, which the kernel does however the launcher ended.
 """
 
 from __future__ import annotations
@@ -13,7 +13,20 @@ import signal
 import sys
 import time
 
+from paramove.documents import Message, MessageError, MessageReader, Pid
+
 GRACE_S = 1.5
+_LONGEST = 200
+
+
+class Watched(Message):
+    """A process group that ends with the launcher from now on, or no longer."""
+
+    group: Pid
+    watched: bool
+
+
+_READER = MessageReader(Watched, max_bytes=_LONGEST)
 
 
 def main() -> None:
@@ -21,11 +34,13 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # a closed terminal must not end the guard before the nodes
     groups: set[int] = set()
-    for line in sys.stdin:
-        if line.startswith("+"):
-            groups.add(int(line[1:]))
-        elif line.startswith("-"):
-            groups.discard(int(line[1:]))
+    while line := sys.stdin.buffer.readline(_LONGEST):
+        with contextlib.suppress(MessageError):  # the last one, of a launcher that was killed while it wrote
+            change = _READER.read(line)
+            if change.watched:
+                groups.add(change.group)
+            else:
+                groups.discard(change.group)
     end_groups(groups, GRACE_S)
     if groups:
         _print(f"paramove: the launcher was killed; its {len(groups)} processes were ended")

@@ -17,12 +17,13 @@ import psutil
 from paramove.bus import START_VARIABLE
 from paramove.documents import printable
 from paramove.supervision.environment import node_environment
+from paramove.supervision.guard import Watched
 from paramove.supervision.launch_schema import NodeSettings
 from paramove.supervision.run_folder import RunFolder
 from paramove.workspace import Workspace
 
 _HERE = Path(__file__).parent
-_NO_SITE = ("-I", "-S")  # these two files need the standard library only, and start faster so
+_NO_SITE = ("-I", "-S")  # `tied.py` needs the standard library only, and starts faster so
 NICE = {"low": 5, "normal": 0, "high": -10}
 """Nice value by the launch file's priority."""
 
@@ -32,10 +33,9 @@ class Guard:
 
     def __init__(self) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, *_NO_SITE, str(_HERE / "guard.py")],
+            [sys.executable, "-P", "-m", "paramove.supervision.guard"],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
-            text=True,
             start_new_session=True,
         )
 
@@ -51,16 +51,16 @@ class Guard:
 
     def watch(self, group: int) -> None:
         """From now on the process group ends with the launcher."""
-        self._send(f"+{group}")
+        self._send(Watched(group=group, watched=True))
 
     def forget(self, group: int) -> None:
         """The process group has ended."""
-        self._send(f"-{group}")
+        self._send(Watched(group=group, watched=False))
 
-    def _send(self, line: str) -> None:
+    def _send(self, change: Watched) -> None:
         if self._process.stdin is not None and not self._process.stdin.closed:
             with contextlib.suppress(BrokenPipeError):  # the guard was killed: the kernel's SIGTERM remains
-                self._process.stdin.write(line + "\n")
+                self._process.stdin.write(change.line() + b"\n")
                 self._process.stdin.flush()
 
 

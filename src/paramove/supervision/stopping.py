@@ -14,11 +14,15 @@ STOP_ALL_S = 10.0
 
 
 def start_waves(file: LaunchFile) -> list[list[str]]:
-    """Nodes of a checked file in the order of their start: each wave needs only nodes of earlier waves."""
+    """Nodes in the order of their start: each wave needs only nodes of earlier waves.
+
+    Nodes that wait for each other, which only an unchecked file has, are the last wave.
+    """
     waves: list[list[str]] = []
     placed: set[str] = set()
     while len(placed) < len(file.nodes):
-        wave = [name for name, node in file.nodes.items() if name not in placed and placed.issuperset(node.after)]
+        left = [name for name in file.nodes if name not in placed]
+        wave = [name for name in left if placed.issuperset(file.nodes[name].after)] or left
         waves.append(wave)
         placed.update(wave)
     return waves

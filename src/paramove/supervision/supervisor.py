@@ -15,13 +15,14 @@ from types import FrameType
 from typing import Any, Protocol, Self
 
 from paramove.bus import BusSettings, Exchange, topics
-from paramove.documents import exit_codes
+from paramove.documents import exit_codes, printable
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.supervision import by_hand
-from paramove.supervision.control import Answer, ControlServer
+from paramove.supervision.control import ControlServer
 from paramove.supervision.environment import node_environment
 from paramove.supervision.events import EventLog, signal_name
 from paramove.supervision.launch_file import Launch
+from paramove.supervision.messages import Answer, Request
 from paramove.supervision.processes import Guard, SupervisedProcess, last_lines, node_process
 from paramove.supervision.queued_output import ignored_by_nohup
 from paramove.supervision.remote_host import RemoteHost
@@ -136,7 +137,7 @@ class Supervisor:
             self._events.write("run_ends", sentence=outcome.reason, exit_code=outcome.code)
         return outcome
 
-    def _by_hand(self, request: dict[str, Any]) -> Answer:
+    def _by_hand(self, request: Request) -> Answer:
         return by_hand.answer(self.nodes, request, self._ending)
 
     def _changed(self, node: SupervisedNode) -> None:
@@ -200,6 +201,8 @@ class Supervisor:
         for name, host in self._hosts.items():
             connected = not host.lost
             host.serve()
+            while host.problems:
+                self._view.problem(host.problems.pop(0))
             if host.lost and connected:
                 self._view.problem(f"the connection to {name} is lost: {host.lost}. Its nodes end by themselves there")
 
@@ -313,7 +316,7 @@ class Supervisor:
                 if message.node in self.nodes:
                     self.nodes[message.node].handle(message)
             elif received.topic is topics.SPEECH:
-                self._view.story(f'robot: "{message.text}"')
+                self._view.story(f'robot: "{printable(message.text)}"')
             elif message.stage != self._stage:
                 self._stage = message.stage
                 self._view.story(f"stage: {message.Stage.Name(message.stage).removeprefix('STAGE_').lower()}")
