@@ -13,13 +13,17 @@ from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, StopRequest
 class CommandedArm(Protocol):
     """An arm that takes commands: `ArmDriver`, or a servo arm with its loop. See there."""
 
-    def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None: ...
+    def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
+        """Takes a trajectory, which is checked as a whole before its first row moves the arm."""
 
-    def on_arm_request(self, message: ArmRequest, captured_ns: int) -> None: ...
+    def on_arm_request(self, message: ArmRequest, captured_ns: int) -> None:
+        """Takes a request to arm or to disarm."""
 
-    def on_link(self, message: LinkState, captured_ns: int) -> None: ...
+    def on_link(self, message: LinkState, captured_ns: int) -> None:
+        """Takes that the other hosts reply."""
 
-    def on_stop(self, message: StopRequest, resent: bool = False) -> None: ...
+    def on_stop(self, message: StopRequest, resent: bool = False) -> None:
+        """Takes a person's stop; `resent`: it was published before the arm's driver had subscribed."""
 
 
 def command_handlers(arm: CommandedArm) -> dict[Topic, Callable[[Received], None]]:
