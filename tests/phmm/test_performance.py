@@ -135,10 +135,3 @@ def test_p_values_of_new_movements_are_about_uniform() -> None:
     assert 0.02 <= below[1] <= 0.1
     assert 0.1 <= below[2] <= 0.3
     assert 0.3 <= below[3] <= 0.7
-
-
-def test_with_one_demonstration_the_p_value_is_unknown() -> None:
-    rng = np.random.default_rng(0)
-    sequence = np.linspace(0.0, 1.0, 60)[:, None] * [1.0, 2.0, 3.0] + rng.normal(0.0, 0.01, (60, 3))
-    model = LinearPHMM(5).fit([sequence], [[0.5]])
-    assert np.isnan(model.examine(sequence + 100.0 * rng.normal(size=(60, 3)).cumsum(axis=0) * 1e-3).p_value)

@@ -73,7 +73,7 @@ def test_one_group_tells_about_itself() -> None:
 
 
 @pytest.mark.parametrize("values", [[], [0.7]])
-def test_of_too_few_values_everything_is_typical(values: list[float]) -> None:
+def test_of_too_few_values_the_probability_is_unknown(values: list[float]) -> None:
     found = PredictiveDistribution.of(np.array(values), np.zeros(len(values), int))
     assert np.isnan(found.log_above(1e6))
 
