@@ -1,10 +1,13 @@
 """What tests of several packages use, and in which order they run."""
 
 import gc
+import signal
 import subprocess
 import sys
 
 import pytest
+
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # `nohup make test` ignores it, and so would the programs that tests start
 
 
 @pytest.hookimpl(wrapper=True)

@@ -81,11 +81,17 @@ def initial_chain(
 
 
 def _clusters(sequences: Sequence[Floats], parts: list[Ints], n_states: int, seed: int) -> list[Ints]:
-    """The cluster of each frame (k-means++, in units of the coordinates' deviations); `parts` where one stays empty."""
+    """The cluster of each frame (k-means++, in units of the coordinates' deviations).
+
+    `parts` where one stays empty, as it must with fewer different frames than states.
+    """
     from scipy.cluster.vq import ClusterError, kmeans2  # a tenth of a second, for ergodic chains only
 
     frames = np.concatenate(list(sequences))
-    scaled = (frames - frames.mean(axis=0)) / np.maximum(frames.std(axis=0), 1e-12)
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = (frames - frames.mean(axis=0)) / np.maximum(frames.std(axis=0), 1e-12)
+    if not np.isfinite(scaled).all() or len(np.unique(scaled.round(6), axis=0)) < n_states:
+        return parts
     best: Ints | None = None
     smallest = np.inf
     for start in range(CLUSTER_STARTS):
