@@ -14,6 +14,9 @@ from paramove.demonstrations.movement import DemonstrationError, Movement
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, read_poses
 from paramove.documents import DocumentError, nearest, raise_any
 
+TIME_TOLERANCE_S = 1e-6
+"""Times of recordings are whole nanoseconds, and sums of them are rounded."""
+
 
 def read_movements(labels: Labels) -> tuple[list[Movement], list[str]]:
     """The movements of all segments, and remarks about gaps that were filled.
@@ -55,7 +58,7 @@ class _Reader:
             return None
         chosen = _frames(segment, poses)
         hole_s = longest_hole(poses.time[chosen])
-        if hole_s > self._labels.file.max_gap * (1.0 + 1e-9):
+        if hole_s > self._labels.file.max_gap + TIME_TOLERANCE_S:
             message = (
                 f"{segment}: no pose at all for {hole_s:.3g} s, longer than max_gap ({self._labels.file.max_gap:g} s). "
                 "Shorten the segment, or raise max_gap"
