@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -12,6 +13,7 @@ from paramove.documents import Floats
 from paramove.hmm import TrainingOptions
 from paramove.phmm import (
     CubicPHMM,
+    ExtrapolationWarning,
     InterpolativePHMM,
     LinearPHMM,
     MovementClassifier,
@@ -62,7 +64,9 @@ class Models(NotAble):
 
     def synthesize(self, theta: Floats, n: int) -> Floats:
         """The prototype."""
-        return self.model.synthesize(theta, n)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ExtrapolationWarning)  # a left-out target may lie far outside on purpose
+            return self.model.synthesize(theta, n)
 
     def estimate(self, x: Floats) -> Estimate:
         """The likeliest theta and its covariance."""
