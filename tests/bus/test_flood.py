@@ -142,7 +142,7 @@ def test_a_publisher_of_commands_that_floods_is_cut_off_and_named_and_may_come_b
     context: Context, folder: Path, wait: Wait, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By the subscriber's own clock, whatever the stamps say; a status names it, other topics arrive."""
-    monkeypatch.setattr("paramove.bus.subscriber.CUT_OFF_S", 1.0)
+    monkeypatch.setattr("paramove.bus.subscriber.CUT_OFF_S", 3.0)  # a status each second
     publisher = Publisher(context, folder, topics.ARM_TRAJECTORY, "wild")
     with Bus("driver", BusSettings(folder=folder), (topics.ARM_TRAJECTORY,)) as bus:
         subscriber = bus.exchange.subscribers["arm/trajectory"]

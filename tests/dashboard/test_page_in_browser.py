@@ -318,7 +318,7 @@ def test_a_lost_connection_is_told_and_comes_back(run: Run, browser: Browser) ->
     run.comes_back()
     run.publish((topics.SPEECH, Speech(text="Here I am again.")))
     browser.until("document.getElementById('sentence').textContent === 'Here I am again.'", "it goes on by itself")
-    assert run.said, "the stop that was pressed meanwhile is sent now"
+    browser.wait(lambda: run.said, "the stop that was pressed meanwhile is sent now")
 
 
 class FalsePage:

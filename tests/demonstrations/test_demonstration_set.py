@@ -23,7 +23,7 @@ NAMES = TEXTS.filter(lambda text: not name_fault(text))
 @st.composite
 def any_movement(draw):
     count = draw(st.integers(2, 9))
-    steps = draw(st.lists(st.integers(1, 10**9), min_size=count - 1, max_size=count - 1))
+    steps = draw(st.lists(st.integers(10**6, 9 * 10**7), min_size=count - 1, max_size=count - 1))
     return Movement(
         time=np.concatenate([[0], np.cumsum(steps)]) / 1e9,
         positions=draw(arrays(np.float64, (count, 2, 3), elements=NUMBERS)),

@@ -30,7 +30,7 @@ from nodes import (
     rule_learner,
     synthesizer,
 )
-from paramove.bus import topics
+from paramove.bus import START_VARIABLE, topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Received
 from paramove.bus.ticks import Tick
@@ -304,7 +304,10 @@ def _faulty(sound: list[Event], protected: bool) -> list[tuple[str, Published]]:
 
 @pytest.mark.parametrize("protected", [True, False], ids=["as the bus hands them out", "without protection"])
 @pytest.mark.parametrize("node", NODES)
-def test_no_message_makes_a_node_fall_over(node: str, protected: bool, tmp_path: Path) -> None:
+def test_no_message_makes_a_node_fall_over(
+    node: str, protected: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(START_VARIABLE, "1")  # as the launcher does
     module, record, _ = NODES[node]
     sound = record()
     faulty = _faulty(sound, protected)
