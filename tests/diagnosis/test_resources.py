@@ -17,6 +17,7 @@ from paramove.diagnosis.resources import (
     sockets_finding,
 )
 from paramove.supervision.environment import OPEN_FILES
+from paramove.workspace import Workspace
 from tests.diagnosis.unprivileged import NOBODY, as_nobody, needs_root
 from tests.docs.markdown import ROOT
 
@@ -122,7 +123,11 @@ def test_too_few_open_files_are_told(limit, level):
 
 def test_a_variable_in_the_way_is_told(monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", "/no/such/folder")
-    assert any("XDG_RUNTIME_DIR" in one.detail for one in environment_findings(ROOT) if one.level is Level.WARNING)
+    assert any(
+        "XDG_RUNTIME_DIR" in one.detail
+        for one in environment_findings(Workspace.at(ROOT))
+        if one.level is Level.WARNING
+    )
 
 
 def test_outside_of_a_clone_runs_lie_where_one_is(tmp_path):

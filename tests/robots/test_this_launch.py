@@ -55,8 +55,8 @@ def process(*command, **options):
 
 def served(folder, module="sim.dynamixel_emulator", **variables):
     """A process of a module that serves a pseudo-terminal, in a folder of its own code."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), **variables}
-    return process("-m", module, cwd=folder, env=environment)
+    environment = {**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}", **variables}
+    return process("-P", "-m", module, cwd=folder, env=environment)
 
 
 def stand_in(folder, module):
@@ -79,8 +79,8 @@ def test_the_emulator_that_this_launch_has_started_is_one(short_folder):
     config.write_text(
         f"{{node: emulator, bus: {bus}, run_folder: {short_folder}/run, parameters: {{robot: {robot}, port: port}}}}"
     )
-    command = [sys.executable, "-m", "sim.dynamixel_emulator", "--config", config]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-P", "-m", "sim.dynamixel_emulator", "--config", config]
+    environment = {**os.environ, "PYTHONPATH": f"{short_folder / 'cell'}{os.pathsep}{ROOT}"}
     with subprocess.Popen(command, cwd=short_folder / "cell", env=environment) as running:
         port = short_folder / "run/port"
         ends_s = time.monotonic() + 20.0
@@ -121,10 +121,10 @@ HIDING = ("termios.py", "numpy/__init__.py", "dynamixel_emulator.py", "paramove/
     ("where", "file"), [("cell", file) for file in (*REPLACING, *HIDING)] + [("library", file) for file in HIDING]
 )
 def test_an_emulator_whose_code_other_files_replace_is_none(tmp_path, where, file):
-    """In its working directory or on PYTHONPATH. They are empty, and put there after its start, so that it runs."""
+    """In a folder of the workspace, or another on PYTHONPATH; empty, and put there after its start, so that it runs."""
     folder, library = stand_in(tmp_path / "cell", "sim.dynamixel_emulator"), tmp_path / "library"
     library.mkdir()
-    with served(folder, PYTHONPATH=f"{library}{os.pathsep}{ROOT}") as (_, name):
+    with served(folder, PYTHONPATH=f"{folder}{os.pathsep}{library}{os.pathsep}{ROOT}") as (_, name):
         assert f"with {folder}/sim/dynamixel_emulator.py instead" in LAUNCH.why_not_servos(Path(name))
         (folder / "sim/dynamixel_emulator.py").write_bytes((ROOT / "sim/dynamixel_emulator.py").read_bytes())
         assert LAUNCH.why_not_servos(Path(name)) == ""

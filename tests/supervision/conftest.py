@@ -38,7 +38,7 @@ class OwnWorkspace:
 
     def __init__(self, root):
         self.root = root
-        self.folders = Workspace((root,))
+        self.folders = Workspace(root, (root,))
         (root / "launch" / "overlays").mkdir(parents=True)
         shutil.copytree(NODES, root / "nodes", ignore=shutil.ignore_patterns("__pycache__"))
         self.launchers = []

@@ -1,6 +1,7 @@
 """What of the environment is taken, ignored or refused: each case with variable, value and remedy."""
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -10,6 +11,7 @@ import pytest
 
 from paramove.supervision.domain import DomainError
 from paramove.supervision.environment import examined
+from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 FILE = str(Path(__file__))
@@ -30,7 +32,7 @@ def environment(monkeypatch, tmp_path):
             else:
                 monkeypatch.setenv(name, value)
         monkeypatch.setattr(tempfile, "tempdir", None)
-        return examined(os.environ, ROOT)
+        return examined(os.environ, Workspace.at(ROOT))
 
     return examine
 
@@ -176,3 +178,12 @@ def test_an_empty_folder_is_a_workspace_before_the_installed_one(tmp_path):
     answer = launch("rule_learning", "--check", cwd=tmp_path)
     assert answer.returncode == 0, answer.stderr
     assert f"workspace {tmp_path}, then {ROOT}" in answer.stdout
+
+
+def test_what_the_folder_replaces_is_named_at_the_start(workspace):
+    """Whatever it is replaced with; a new file, such as an own node, replaces nothing."""
+    workspace.write("nodes: {main: {module: nodes.silent_actor, ends_run: true, parameters: {lasts_s: 0.1}}}")
+    (workspace.root / "nodes" / "camera.py").write_text("SUBSCRIBES = ()\nPUBLISHES = ()\n")
+    answer = launch("test", cwd=workspace.root)
+    assert answer.returncode == 0, answer.stderr
+    assert re.search(r"^replaced there: .*nodes/camera\.py$", answer.stdout, re.MULTILINE)

@@ -30,7 +30,7 @@ EXPECTED = expected()
 
 def rejection(folder, name):
     with pytest.raises(DocumentError) as caught:
-        application.check(load(Workspace((folder.parent,)), name), Workspace.at(ROOT))
+        application.check(load(Workspace(folder.parent, (folder.parent,)), name), Workspace.at(ROOT))
     return str(caught.value).replace(f"{folder}/", "").replace(str(ROOT), "WORKSPACE").splitlines()
 
 
@@ -64,7 +64,9 @@ GOOD = "nodes:\n  operator:\n    module: nodes.operator\n    optional_topics: ['
 )
 def test_what_editors_make_of_a_file_does_not_matter(launches, content):
     (launches / "good.yaml").write_bytes(content)
-    assert list(application.check(load(Workspace((launches.parent,)), "good"), Workspace.at(ROOT))) == ["operator"]
+    assert list(
+        application.check(load(Workspace(launches.parent, (launches.parent,)), "good"), Workspace.at(ROOT))
+    ) == ["operator"]
 
 
 @pytest.mark.parametrize(
@@ -85,7 +87,7 @@ def test_bytes_that_are_no_launch_file(launches, content, message):
 def test_a_folder_is_no_launch_file(launches):
     (launches / "bad.yaml").mkdir()
     with pytest.raises(DocumentError, match="there is no such launch file"):
-        load(Workspace((launches.parent,)), "bad")
+        load(Workspace(launches.parent, (launches.parent,)), "bad")
 
 
 def test_no_value_reaches_a_shell(workspace):
@@ -152,7 +154,12 @@ def test_damaged_launch_file_raises_nothing_but_its_error(path, mutations, tmp_p
     overlays = [path.stem] if path.parent.name == "overlays" else ["sim"]
     try:
         launch = load(
-            Workspace((folder.parent,)), "rule_learning", overlays, ["camera.width=640"], seed=1, headless=True
+            Workspace(folder.parent, (folder.parent,)),
+            "rule_learning",
+            overlays,
+            ["camera.width=640"],
+            seed=1,
+            headless=True,
         )
         interfaces = wiring.read_interfaces(launch, Workspace.at(ROOT))
         list(wiring.topic_findings(launch, interfaces))

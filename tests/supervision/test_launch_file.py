@@ -27,7 +27,7 @@ nodes:
 
 
 def load(folder, *arguments, **options):
-    return launch_file.load(Workspace((folder.parent,)), *arguments, **options)
+    return launch_file.load(Workspace(folder.parent, (folder.parent,)), *arguments, **options)
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ needs:
 
 def missing(launches, text, *settings):
     (launches / "one.yaml").write_text(NODES + text)
-    workspace = Workspace((launches.parent,))
+    workspace = Workspace(launches.parent, (launches.parent,))
     return missing_files(launch_file.load(workspace, "one", settings=settings), workspace)
 
 

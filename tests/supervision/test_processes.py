@@ -63,7 +63,7 @@ def test_children_left_behind_are_killed(guard, tmp_path):
 def test_a_node_knows_from_the_launcher_that_it_was_started_before(guard, tmp_path):
     """Whatever is deleted in the run's folder."""
     (tmp_path / "which.py").write_text("from paramove.bus import is_first_start; print(is_first_start())")
-    workspace, settings = Workspace((tmp_path,)), NodeSettings(module="which")
+    workspace, settings = Workspace(tmp_path, (tmp_path,)), NodeSettings(module="which")
     run_folder = RunFolder(tmp_path / "run")
     for number, expected in enumerate(("True", "False", "False")):
         run_folder.logs.mkdir(parents=True)

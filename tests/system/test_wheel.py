@@ -54,7 +54,7 @@ def core(tmp_path):
 
 
 def test_every_file_of_the_workspace_travels_in_it(installed):
-    carried = Workspace((installed / "paramove" / "workspace",)).files()
+    carried = Workspace(installed, (installed / "paramove" / "workspace",)).files()
     tracked = subprocess.run(["git", "ls-files", *PARTS], cwd=ROOT, capture_output=True, text=True, check=True)
     assert {name for name in tracked.stdout.splitlines() if (ROOT / name).is_file()} <= set(carried)
     packages = ["dynamixel_emulator", "paramove"]

@@ -50,6 +50,8 @@ def graph(
 ) -> None:
     """Draw which node publishes and subscribes to what, with rates; topics without publisher are marked.
 
+    Nodes of a launch file are not run or imported for it.
+
     Exit codes: 0 done; 1 nothing is running; 66 no such launch file; 77 the output cannot be written; 78 the launch
     file is wrong.
     """
@@ -68,13 +70,13 @@ def graph(
 
 
 def _launched(name: str, overlays: list[str] | None) -> Graph:
-    from paramove.supervision import check, graph_of, load
+    from paramove.supervision import check_topics, graph_of, load
     from paramove.workspace import Workspace
 
     with one_line():
         workspace = Workspace.here()
         launch = load(workspace, name, overlays)
-        return graph_of(launch, check(launch, workspace))
+        return graph_of(launch, check_topics(launch, workspace))
 
 
 def _running(domain: str | None) -> Graph:

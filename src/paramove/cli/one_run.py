@@ -68,7 +68,7 @@ def run(
         launch = None
         try:
             workspace = Workspace.here()
-            environment = examined(os.environ, workspace.root)
+            environment = examined(os.environ, workspace)
             for note in environment.notes:
                 errors.print(f"note: {note}")
             if page:
@@ -145,7 +145,7 @@ def _made(missing: MissingFile, workspace: Workspace, pages: Path | None) -> int
     shared = {} if pages is None else {FOLDER_VARIABLE: str(pages)}
     try:
         return subprocess.run(
-            [sys.executable, "-m", "paramove.cli.main", *missing.command],
+            [sys.executable, "-P", "-m", "paramove.cli.main", *missing.command],
             cwd=workspace.root,
             env={**os.environ, **shared},
             check=False,
@@ -196,6 +196,7 @@ def _found(launch: Launch, environment: Environment, workspace: Workspace) -> li
         f"  overlays  {', '.join(launch.overlays) or 'none'}{seeds}",
         f"  clock     {clock}",
         f"  workspace {workspace} ({workspace.digest})",
+        *(f"  replaced  {printable(name)}" for name in workspace.replaced()),
         f"  domain    {environment.domain}, sockets in {environment.sockets}",
         f"  python    {sys.executable}",
         *(f"  missing   {one.path.name}: {one.about}; {one.typed}" for one in missing_files(launch, workspace)),
@@ -231,6 +232,8 @@ def _view(
 ) -> View:
     console.print(f"run folder {folder.path}", soft_wrap=True)
     console.print(f"workspace {workspace} ({workspace.digest})", soft_wrap=True)
+    if replaced := workspace.replaced():
+        console.print(f"replaced there: {', '.join(map(printable, replaced))}", soft_wrap=True)
     console.print(f"domain {environment.domain}, sockets in {environment.sockets}", soft_wrap=True)
     view = (TableView if console.is_terminal and not headless else LineView)(console, output)
     return AnnouncingView(view, folder.path)

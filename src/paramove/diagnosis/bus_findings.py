@@ -174,4 +174,4 @@ def _command(port: Path, servo: DetectedServo, call: str) -> str:
     """For a shell: what dynamixel-sdk is to do with a servo at its rate."""
     code = f"from dynamixel_sdk import *; p = PortHandler({json.dumps(str(port))}); p.openPort(); "
     code += f"p.setBaudRate({servo.baud_rate}); print(PacketHandler(2.0).{call})"
-    return shlex.join((sys.executable, "-c", code))
+    return shlex.join((sys.executable, "-P", "-c", code))

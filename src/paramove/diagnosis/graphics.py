@@ -55,7 +55,7 @@ def failure_to_draw(backend: str, script: str = DRAW) -> str:
         script: Is given it as its argument.
     """
     variables = dict(os.environ) if backend == graphics_backend() else {**os.environ, "MUJOCO_GL": backend}
-    command = [sys.executable, "-c", script, backend]
+    command = [sys.executable, "-P", "-c", script, backend]
     try:
         done = subprocess.run(command, env=variables, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired:

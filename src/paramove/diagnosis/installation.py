@@ -95,7 +95,7 @@ def opencv_finding(installed: Iterable[Distribution], script: str = IMPORT_CV2) 
         return _fixed_by_pip("opencv", message, [("uninstall", "-y", *owners), again])
     try:
         done = subprocess.run(
-            [sys.executable, "-c", script], capture_output=True, text=True, timeout=TIMEOUT_S, check=False
+            [sys.executable, "-P", "-c", script], capture_output=True, text=True, timeout=TIMEOUT_S, check=False
         )
     except subprocess.TimeoutExpired:
         return _fixed_by_pip("opencv", f"cv2 is not imported within {TIMEOUT_S:g} s", [again])
@@ -119,7 +119,7 @@ def _required_opencv(installed: Iterable[Distribution]) -> str:
 
 
 def _fixed_by_pip(subject: str, message: str, calls: Sequence[Sequence[str]]) -> Finding:
-    commands = [(sys.executable, "-m", "pip", *call) for call in calls]
+    commands = [(sys.executable, "-P", "-m", "pip", *call) for call in calls]
     remedy = tuple(map(shlex.join, commands))
     fix = Fix(f"run {' && '.join(remedy)}", functools.partial(_run_all, commands))
     return Finding(subject, Level.PROBLEM, message, remedy, fix)

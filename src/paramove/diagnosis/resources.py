@@ -33,9 +33,9 @@ is a warning."""
 
 def resources_findings(machine: Machine) -> Iterator[Finding]:
     """Of folders, disks, limits, and variables of the environment."""
-    workspace = Workspace.at(machine.folder).root
+    workspace = Workspace.at(machine.folder)
     folders = {"cache": user_cache_path("paramove"), "temporary": Path(tempfile.gettempdir())}
-    folders["runs"] = workspace / "runs"
+    folders["runs"] = workspace.root / "runs"
     for name, folder in folders.items():
         yield folder_finding(name, folder)
     yield sockets_finding()
@@ -138,8 +138,8 @@ def open_files_finding(hard_limit: int) -> Finding:
     return Finding("open files", Level.PROBLEM, message, (line, "log out and in again"))
 
 
-def environment_findings(workspace: Path) -> Iterator[Finding]:
-    """Variables of the environment that a run in this workspace ignores or that disturb it."""
+def environment_findings(workspace: Workspace) -> Iterator[Finding]:
+    """Variables and folders that a run in this workspace ignores or that disturb it."""
     try:
         notes = examined(os.environ, workspace).notes
     except DomainError:  # reported with the sockets

@@ -18,7 +18,7 @@ from platformdirs import user_cache_path
 from paramove.documents import InputError, replacing
 from paramove.observation.pose_network import PoseNetwork
 
-PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--no-deps", "--only-binary=:all:")
+PIP = (sys.executable, "-P", "-m", "pip", "--disable-pip-version-check", "download", "--no-deps", "--only-binary=:all:")
 SYSTEM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "3.11", "--implementation", "cp", "--abi", "cp311")
 """Of the one wheel whose hash is known; nothing in it is run."""
 

@@ -204,14 +204,15 @@ class RobotDescription:
         """Read and check a `robot.yaml`.
 
         Args:
-            path: The file or its folder, here or in the workspace; or the name of a folder in `robot_description/`.
+            path: The file or its folder, in the workspace or here; or the name of a folder in `robot_description/`.
 
         Raises:
             DescriptionError: The file is missing, is not YAML, has unknown or wrong fields, or contradicts itself.
         """
         path = Path(path)
-        if not path.exists() and not path.is_absolute():
-            path = Workspace.here().find(path if len(path.parts) > 1 else Path("robot_description", path))
+        if not path.is_absolute():
+            described = Workspace.here().find(path if len(path.parts) > 1 else Path("robot_description", path))
+            path = described if described.exists() or not path.exists() else path
         if path.is_dir():
             path = path / "robot.yaml"
         return _assemble(path, read_robot_file(path))

@@ -1,9 +1,9 @@
 """Whether a process is an emulator that a launcher started, and runs the installed code.
 
 A node may serve a pseudo-terminal and pass on what it receives. Only two modules of the installed workspace emulate
-robots, so a process counts if the launcher itself started one of them, by the Python of this process, and if no file of
-its working directory or PYTHONPATH replaces a module of it. This is read from the system (/proc), and is no defence
-against a user who changes the installed files, or a running process.
+robots, so a process counts if the launcher itself started one of them, by the Python of this process, and if no file on
+PYTHONPATH replaces a module of it (by `-P` the working directory is not searched). This is read from the system
+(/proc), and is no defence against a user who changes the installed files, or a running process.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from paramove.workspace import Workspace
 MODULES = ("sim.dynamixel_emulator", "sim.simulator")
 """That emulate a robot."""
 LAYERED = "sim"
-"""The package whose modules the working directory may add to, or replace."""
+"""The package whose modules a folder of the workspace may add to, or replace."""
 IMPORTED_AT_START = ("sitecustomize", "usercustomize")
 
 
@@ -35,19 +35,19 @@ def why_no_emulator(pid: int, launcher: int) -> str:
         folder, variables = Path(process.cwd()), process.environ()
     except (psutil.Error, OSError) as error:
         return f"cannot be inspected ({type(error).__name__})"
-    module = command[2] if command[1:2] == ["-m"] and len(command) > 2 else ""
+    module = command[3] if command[1:3] == ["-P", "-m"] and len(command) > 3 else ""
     if module not in MODULES:
         return f"runs {module or ' '.join(command[:2])}, none of the emulators {', '.join(MODULES)}"
     if not _same_file(Path(program), Path(sys.executable)):
         return f"is run by {program}, not by {sys.executable}"
     paths = [Path(entry) for entry in variables.get("PYTHONPATH", "").split(os.pathsep) if entry]
-    replaced = next(_replaced_modules([folder, *(folder / path for path in paths)]), None)
+    replaced = next(_replaced_modules([folder / path for path in paths]), None)
     return f"runs {module}, but with {replaced} instead of the installed file" if replaced else ""
 
 
 def _replaced_modules(folders: list[Path]) -> Iterator[Path]:
     """Files in these folders of a module search path that Python finds before a module of the installation."""
-    installed = Workspace.here().folders[-1]
+    installed = Workspace.here().layers[-1]
     others = [
         folder for folder in folders if not any(_same_file(folder, one) for one in (installed, installed / "src"))
     ]

@@ -16,6 +16,8 @@ from typing import Any
 
 from paramove.documents import exit_codes, replacing
 from paramove.runs.recorded_run import judged
+from paramove.supervision import node_environment
+from paramove.workspace import Workspace
 
 APPLICATION = "rule_learning"
 EVALUATOR = "paramove.runs.rule_learning"
@@ -110,7 +112,16 @@ def run_seed(seed: int, options: BatchOptions, children: Children) -> dict[str, 
     """One run and its evaluation; the result is stored unless the run was interrupted."""
     runs = options.folder / f"seed_{seed:04d}"
     environment = os.environ | {"PARAMOVE_DOMAIN": f"eval-{os.getpid()}-{seed}"}
-    launch = [sys.executable, "-m", "paramove.cli.main", "launch", APPLICATION, f"--seed={seed}", f"--runs={runs}"]
+    launch = [
+        sys.executable,
+        "-P",
+        "-m",
+        "paramove.cli.main",
+        "launch",
+        APPLICATION,
+        f"--seed={seed}",
+        f"--runs={runs}",
+    ]
     launch += [f"--set={setting}" for setting in options.settings]
     launch += [f"--with={overlay}" for overlay in options.overlays]
     launch += [] if options.robot is None else [f"--robot={options.robot}"]
@@ -128,9 +139,10 @@ def run_seed(seed: int, options: BatchOptions, children: Children) -> dict[str, 
     if launched in INTERRUPTED or launched < 0:
         return result | {"success": False, "reason": "interrupted"}
     if (folder / "truth.mcap").is_file() and not (folder / "run.json").is_file():
-        evaluate = [sys.executable, "-m", EVALUATOR, str(folder)]
+        evaluate = [sys.executable, "-P", "-m", EVALUATOR, str(folder)]
         evaluate += [] if options.video else ["--no-video", "--no-report"]
-        children.call(evaluate, options.workspace, environment, options.folder / f"seed_{seed:04d}.log")
+        searched = node_environment(environment, Workspace.at(options.workspace))
+        children.call(evaluate, options.workspace, searched, options.folder / f"seed_{seed:04d}.log")
     result |= judged(folder / "run.json", "the run ended before it could be evaluated; see its logs")
     with replacing(result_file(options.folder, seed)) as unfinished:
         text = json.dumps(result, indent=2, sort_keys=True, ensure_ascii=False)

@@ -2,6 +2,7 @@ from . import application as application
 from .agent import Agent as Agent
 from .agent import release_of as release_of
 from .application import check as check
+from .application import check_topics as check_topics
 from .control import NoRunError as NoRunError
 from .control import ask as ask
 from .domain import LONGEST_FOLDER as LONGEST_FOLDER
@@ -13,6 +14,7 @@ from .environment import OPEN_FILES as OPEN_FILES
 from .environment import Environment as Environment
 from .environment import LimitError as LimitError
 from .environment import examined as examined
+from .environment import node_environment as node_environment
 from .graph import Graph as Graph
 from .graph import as_mermaid as as_mermaid
 from .graph import as_text as as_text

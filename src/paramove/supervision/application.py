@@ -37,6 +37,16 @@ def check(launch: Launch, workspace: Workspace) -> dict[str, Interface]:
     return interfaces
 
 
+def check_topics(launch: Launch, workspace: Workspace) -> dict[str, Interface]:
+    """The interfaces as the sources of the nodes show them, whose topics fit together; imports none of the nodes.
+
+    Raises DocumentError, also for topics that only an import would show.
+    """
+    interfaces = read_interfaces(launch, workspace, may_import=False)
+    raise_any(list(topic_findings(launch, interfaces)))
+    return interfaces
+
+
 def run(
     launch: Launch, workspace: Workspace, make_view: Callable[[RunFolder], View], runs: Path | None = None
 ) -> tuple[Outcome, RunFolder]:
@@ -142,7 +152,7 @@ def _facts(launch: Launch, workspace: Workspace, domain: str, begun: datetime.da
         "begun": begun.isoformat(timespec="seconds"),
         "version": __version__,
         "commit": _commit(workspace.clone),
-        "workspace": {"folders": [str(folder) for folder in workspace.folders], "sha256": workspace.digest},
+        "workspace": {"folders": [str(folder) for folder in workspace.layers], "sha256": workspace.digest},
     }
 
 

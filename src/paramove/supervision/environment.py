@@ -43,18 +43,19 @@ class Environment:
     notes: tuple[str, ...]
 
 
-def examined(variables: Mapping[str, str], workspace: Path) -> Environment:
+def examined(variables: Mapping[str, str], workspace: Workspace) -> Environment:
     """Checks the variables that have an effect; raises DomainError for an invalid name of a domain."""
     domain = variables.get("PARAMOVE_DOMAIN") or DEFAULT_DOMAIN
     check_name(domain)
     sockets = default_folder(domain)
     notes = [
+        *workspace.left_out,
         *_ignored_folder(variables, "XDG_RUNTIME_DIR", f"sockets lie in {sockets}"),
         *_ignored_folder(variables, "TMPDIR", f"temporary files lie in {tempfile.gettempdir()}"),
         *_cache_folder(variables),
         *_time_zone(variables),
         *_hidden_modules(variables, workspace),
-        *_owner(workspace),
+        *_owner(workspace.root),
     ]
     return Environment(domain, sockets, tuple(notes))
 
@@ -62,12 +63,17 @@ def examined(variables: Mapping[str, str], workspace: Path) -> Environment:
 def node_environment(own: Mapping[str, str], workspace: Workspace) -> dict[str, str]:
     """Environment of the nodes: the launcher's own, with one thread for each linear-algebra library unless set.
 
-    Python finds modules in the working directory, the workspace's root, and then in the workspace's other folders.
+    Python finds modules in the workspace's layers and then in what PYTHONPATH names: an empty entry, which means the
+    working directory, is left out, as this is searched only if it is a layer. Nodes are started with `-P` therefore.
     """
-    environment = {**ONE_THREAD, **own, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1"}
-    environment.pop("PYTHONSAFEPATH", None)
-    path = [*map(str, workspace.folders[1:]), *filter(None, [own.get("PYTHONPATH")])]
-    return {**environment, "PYTHONPATH": os.pathsep.join(path)} if path else environment
+    path = [*map(str, workspace.layers), *filter(None, own.get("PYTHONPATH", "").split(os.pathsep))]
+    return {
+        **ONE_THREAD,
+        **own,
+        "PYTHONUNBUFFERED": "1",
+        "PYTHONFAULTHANDLER": "1",
+        "PYTHONPATH": os.pathsep.join(path),
+    }
 
 
 def run_python(
@@ -75,7 +81,7 @@ def run_python(
 ) -> subprocess.CompletedProcess[str]:
     """Runs Python as it runs the nodes of a workspace. Raises subprocess.TimeoutExpired."""
     return subprocess.run(
-        [sys.executable, *arguments],
+        [sys.executable, "-P", *arguments],
         input=stdin,
         cwd=workspace.root,
         env=node_environment(os.environ, workspace),
@@ -128,12 +134,13 @@ def _time_zone(variables: Mapping[str, str]) -> Iterator[str]:
         yield f"TZ={value!r} is not a known time zone; runs are named by UTC. Unset it or correct it"
 
 
-def _hidden_modules(variables: Mapping[str, str], workspace: Path) -> Iterator[str]:
-    """Files that Python finds before the required modules: in the workspace's root, or on PYTHONPATH."""
+def _hidden_modules(variables: Mapping[str, str], workspace: Workspace) -> Iterator[str]:
+    """Files that Python finds before the required modules: in the workspace's first layer, or on PYTHONPATH."""
     names = {*NEEDED.split(), *sys.stdlib_module_names}
-    folders = [(workspace, "the workspace's root", "rename it")]
+    first = workspace.layers[0]
+    folders = [(first, "the workspace's root", "rename it")]
     for entry in variables.get("PYTHONPATH", "").split(os.pathsep):
-        if entry and Path(entry).resolve() not in (workspace, workspace / "src"):
+        if entry and Path(entry).resolve() not in (first, first / "src"):
             folders.append((Path(entry), "PYTHONPATH", "unset PYTHONPATH"))
     for folder, where, remedy in folders:
         try:

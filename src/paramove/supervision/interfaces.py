@@ -61,13 +61,13 @@ def source_of(module: str, workspace: Workspace) -> Path:
     )
 
 
-def read_interface(module: str, workspace: Workspace) -> Interface:
+def read_interface(module: str, workspace: Workspace, *, may_import: bool = True) -> Interface:
     """Interface of a node's module.
 
     SUBSCRIBES and PUBLISHES are read from the source as long as they are written as `topics.NAME`, tuples and sums of
     these; otherwise the module is imported once in a process of its own, because nodes import heavy libraries.
 
-    Raises InterfaceError.
+    Raises InterfaceError, also where only an import would show the topics and `may_import` is False.
     """
     path = source_of(module, workspace)
     try:
@@ -80,6 +80,13 @@ def read_interface(module: str, workspace: Workspace) -> Interface:
     try:
         subscribes, publishes = (_topics(assigned[name], assigned, path) for name in names)
     except _NotPlainError:
+        if not may_import:
+            message = (
+                f"{path}: SUBSCRIBES or PUBLISHES has more than names such as topics.SPEECH, so that only the node's "
+                "own code knows its topics, and that is not run to look at it; write the names, or look at it while it "
+                "runs: paramove graph"
+            )
+            raise InterfaceError(message) from None
         subscribes, publishes = _imported(module, workspace, path.stat().st_mtime_ns, *names)
     return Interface(path, subscribes, publishes, config is not None, config is not None and _needs_parameters(config))
 

@@ -66,7 +66,7 @@ def _passed_before(
     to_check: Sequence[_ToCheck], interfaces: Mapping[str, Interface], workspace: Workspace
 ) -> Path | None:
     """A file that exists once these parameters were right for this code; None if the code of a node may be anywhere."""
-    if not all(interfaces[name].path.is_relative_to(workspace.folders[-1]) for name, _, _ in to_check):
+    if not all(interfaces[name].path.is_relative_to(workspace.layers[-1]) for name, _, _ in to_check):
         return None
     code = code_digest(*(module for _, module, _ in to_check))
     key = json.dumps([to_check, code, workspace.digest, sys.version, version("pydantic")])

@@ -169,7 +169,7 @@ def node_process(
     run_folder.starts[name] += 1
     start = {START_VARIABLE: str(run_folder.starts[name])}
     process = SupervisedProcess(
-        [sys.executable, "-m", settings.module, "--config", str(run_folder.config(name))],
+        [sys.executable, "-P", "-m", settings.module, "--config", str(run_folder.config(name))],
         folder=workspace.root,
         environment=node_environment(os.environ, workspace) | start,
         guard=guard,

@@ -278,7 +278,7 @@ class Supervisor:
         """Calls `after_run` with the run folder; its exit code decides whether a run without failure succeeds."""
         options = ["--no-video"] if self._headless else []
         judge = SupervisedProcess(
-            [sys.executable, "-m", module, str(self._folder.path), *options],
+            [sys.executable, "-P", "-m", module, str(self._folder.path), *options],
             folder=self._workspace.root,
             environment=node_environment(os.environ, self._workspace),
             guard=self._guard,

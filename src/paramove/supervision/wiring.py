@@ -14,8 +14,12 @@ from paramove.supervision.parameters import wrong_parameters
 from paramove.workspace import Workspace
 
 
-def read_interfaces(launch: Launch, workspace: Workspace) -> dict[str, Interface]:
+def read_interfaces(launch: Launch, workspace: Workspace, *, may_import: bool = True) -> dict[str, Interface]:
     """Interface of every node.
+
+    Args:
+        launch: Its nodes. workspace: Where their modules are.
+        may_import: Whether modules may be imported, where their sources do not suffice.
 
     Raises DocumentError with every `module` and `after_run` that does not exist, and with the wrong parameters of
     the nodes that do.
@@ -24,7 +28,7 @@ def read_interfaces(launch: Launch, workspace: Workspace) -> dict[str, Interface
     findings = []
     for name, node in launch.file.nodes.items():
         try:
-            interfaces[name] = read_interface(node.module, workspace)
+            interfaces[name] = read_interface(node.module, workspace, may_import=may_import)
         except InterfaceError as error:
             findings.append(launch.error(("nodes", name, "module"), str(error)))
     if launch.file.after_run is not None:
@@ -32,8 +36,9 @@ def read_interfaces(launch: Launch, workspace: Workspace) -> dict[str, Interface
             source_of(launch.file.after_run, workspace)
         except InterfaceError as error:
             findings.append(launch.error(("after_run",), str(error)))
-    if findings:
-        raise_any([*findings, *wrong_parameters(launch, interfaces, workspace)])
+    if findings and may_import:
+        findings += wrong_parameters(launch, interfaces, workspace)
+    raise_any(findings)
     return interfaces
 
 
