@@ -29,15 +29,18 @@ def rest() -> None:
     """Nothing is done."""
 
 
-def hands(emulator: DynamixelEmulator) -> list[Step]:
-    """What a person does and then types, step by step; after a line "look" the joints' places are told."""
+def hands(emulator: DynamixelEmulator, zero: float = 2048.0) -> list[Step]:
+    """What a person does and then types, step by step; after a line "look" the joints' places are told.
+
+    `zero` are the counts of every servo in the zero pose, by the way in which the arm was put together.
+    """
 
     def move(angles: dict[str, float]) -> Callable[[], None]:
         def act() -> None:
             with emulator.lock:
                 for servo, planned in zip(emulator.bus.servos, PLAN.servos, strict=True):
                     if planned.joint in angles:
-                        servo.turned(2048.0 + COUNTS_PER_RAD * angles[planned.joint])
+                        servo.turned(zero + COUNTS_PER_RAD * angles[planned.joint])
 
         return act
 

@@ -27,6 +27,11 @@ CHOICE = (
     "joints differ, the file is of another arm: `paramove arm scan` shows who is there"
 )
 
+ANOTHER_ARM = (
+    "no servo is set as this file has it, and its adapter has no serial number, so that this seems to be another arm: "
+    "nothing was written; run `paramove arm calibrate`, or connect the arm of the file"
+)
+
 
 def verify(
     robot: Annotated[
@@ -50,7 +55,7 @@ def verify(
     Exit codes: 0 no difference; 2 contrary options; 3 differences, in a table; 66 no calibration; 69 no adapter, or no
     servo answers; 78 the file is damaged, edited and not signed, or of another arm.
     """
-    from paramove.robots.dynamixel import adopted, compare, load_plan, sign_again
+    from paramove.robots.dynamixel import adopted, compare, is_same_arm, load_plan, sign_again
 
     if write and adopt:
         raise ended("--write and --adopt are contrary: choose one", exit_codes.USAGE)
@@ -60,6 +65,9 @@ def verify(
         if sign:
             sign_again(arm.path)
         _check_baud_rate(arm)
+        is_known = arm.adapter.is_numbered or is_same_arm(arm.chain, arm.calibration())
+        if (write or adopt) and not is_known:
+            raise ended(f"{arm.path}: {ANOTHER_ARM}", exit_codes.CONFIGURATION)
         if write:
             _write(arm)
         if adopt:
@@ -71,7 +79,7 @@ def verify(
         show(rows, as_json=False)
         typer.echo(f"{arm.path}: {len(rows) or 'no'} difference{'s' * (len(rows) != 1)}")
     if rows:
-        typer.echo(CHOICE, err=True)
+        typer.echo(CHOICE if is_known else ANOTHER_ARM, err=True)
         raise typer.Exit(exit_codes.JUDGED_A_FAILURE)
 
 

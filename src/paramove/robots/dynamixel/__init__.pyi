@@ -53,7 +53,9 @@ from .calibration.arm_plan import load_plan as load_plan
 from .calibration.path import DATA_VARIABLE as DATA_VARIABLE
 from .calibration.path import calibration_path as calibration_path
 from .calibration.path import check_writable as check_writable
+from .calibration.path import keep_earlier as keep_earlier
 from .calibration.procedure import ArmCalibrator as ArmCalibrator
 from .calibration.servo_settings import adopted as adopted
 from .calibration.servo_settings import compare as compare
+from .calibration.servo_settings import is_same_arm as is_same_arm
 from .calibration.servo_settings import write_settings as write_settings

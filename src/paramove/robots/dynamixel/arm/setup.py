@@ -17,7 +17,7 @@ from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
 from paramove.robots.dynamixel.bus.clock import PACING_SOCKET, Clock, EmulatorClock
-from paramove.robots.dynamixel.bus.serial_adapters import serial_of
+from paramove.robots.dynamixel.bus.serial_adapters import SerialAdapter
 from paramove.robots.dynamixel.bus.servo_models import ServoModel, model_named
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
@@ -108,7 +108,7 @@ class ServoArmSetup(OldNames):
         port = servo_port(description, str(run_folder / self.port), timeouts.read_s, pace)
         calibration = None
         if self.calibration is not None:
-            calibration = ArmCalibration.load(self.calibration, serial_of(self.port.name))
+            calibration = ArmCalibration.load(self.calibration, SerialAdapter.at(run_folder / self.port).serial)
             description = calibrated(description, calibration)
         is_even = emulated is not None and emulated.nominal
         is_refused = self.emulated is not None and emulated is None

@@ -1,4 +1,8 @@
-"""USB adapters of serial buses, identified by their serial numbers: /dev/ttyUSB0 may be another after the next boot."""
+"""USB adapters of serial buses, identified by their serial numbers: /dev/ttyUSB0 may be another after the next boot.
+
+Adapters of some chips, such as the CH340, have no number, and those of others all the same. These are identified by
+their kind and the USB port that they are plugged into, as udev's links in `by-path` have it.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +12,20 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+from serial.tools.list_ports_linux import SysFS
+
 from paramove.documents import InputError
 
 BY_ID = Path("/dev/serial/by-id")
 BY_ID_VARIABLE = "PARAMOVE_SERIAL_BY_ID"
 INTERFACE = re.compile(r"-if\d+(-port\d+)?$")
+BY_PATH = "by-path"
+USB = "usb-"
+"""Beginning of a link that names a USB adapter."""
+NUMBER = re.compile(r"[0-9A-Za-z]*[0-9][0-9A-Za-z]*")
+"""The form of numbers; the end of the name of an adapter without one is a word, such as Serial or USB2.0-Serial."""
+SAME_FOR_ALL = re.compile(r"0*1?")
+"""No number, and those that chips have until a maker writes another one, such as 0001 of the CP2102."""
 NOTHING_FOUND = (
     "plug in the adapter and switch on its power; `ls /dev/ttyUSB* /dev/ttyACM*` shows whether the system detects it, "
     "`sudo usermod -aG dialout $USER` and a new login let you open it, and in a container the folder must be passed in"
@@ -24,12 +37,35 @@ class SerialAdapter:
     """One adapter that is plugged in.
 
     Attributes:
-        serial: Number that its maker gave it, such as FT6Z5NCH.
+        serial: Number that its maker gave it, such as FT6Z5NCH; without one, its kind and USB port:
+            1a86:7523@pci-0000:00:14.0-usb-0:2:1.0.
         link: Name that stays the same from boot to boot.
+        is_numbered: Whether its maker gave it a number. Otherwise another may take its place unnoticed.
     """
 
     serial: str
     link: Path
+    is_numbered: bool = True
+
+    @classmethod
+    def at(cls, link: Path) -> SerialAdapter:
+        """The adapter behind a link of udev, or behind any other name, which then takes the place of its number."""
+        device = link.resolve()
+        system = SysFS(str(device)) if device.is_relative_to("/dev") else None
+        name = INTERFACE.sub("", link.name)
+        last = name.rpartition("_")[2]
+        if system is not None and system.usb_device_path:
+            kind = f"{system.vid:04x}:{system.pid:04x}"
+            number = system.serial_number or ""
+        else:
+            kind = ""
+            is_unnumbered = link.parent.name == BY_PATH or (name.startswith(USB) and not NUMBER.fullmatch(last))
+            number = "" if is_unnumbered else last
+        if not SAME_FOR_ALL.fullmatch(number):
+            return cls(number, link)
+        port = _usb_port(link)
+        identity = "@".join(filter(None, (kind, port))) if port else name.removeprefix(USB)
+        return cls(identity, link, is_numbered=False)
 
     @property
     def device(self) -> str:
@@ -37,20 +73,34 @@ class SerialAdapter:
         return str(self.link.resolve())
 
 
+def _usb_port(link: Path) -> str:
+    """Name of the USB port; "" where udev has made no link of it. Of two names it is the first in their order."""
+    device = link.resolve()
+    names = sorted(other.name for other in adapter_links(by_path(link.parent)) if other.resolve() == device)
+    return INTERFACE.sub("", re.sub(r"-port\d+$", "", names[0])) if names else ""
+
+
+def by_path(by_id: Path) -> Path:
+    """Folder of the links that name USB ports, beside that of the links that name adapters."""
+    return by_id.parent / BY_PATH
+
+
 def default_by_id() -> Path:
     """Folder of the links: $PARAMOVE_SERIAL_BY_ID, else /dev/serial/by-id."""
     return Path(os.environ.get(BY_ID_VARIABLE) or BY_ID)
 
 
-def serial_of(name: str) -> str:
-    """USB serial number within a link's name: FT6Z5NCH of usb-FTDI_USB__-__Serial_Converter_FT6Z5NCH-if00-port0."""
-    return INTERFACE.sub("", name).rpartition("_")[2]
-
-
 def serial_adapters(by_id: Path | None = None) -> list[SerialAdapter]:
-    """All that are plugged in, by serial number. A folder that is not there holds none."""
-    links = [path for path in adapter_links(by_id or default_by_id()) if path.exists()]
-    return sorted((SerialAdapter(serial_of(path.name), path) for path in links), key=lambda one: one.serial)
+    """All that are plugged in, by serial number. A folder that is not there holds none.
+
+    Of two adapters of one name udev links one by its name: the other is found by its USB port.
+    """
+    folder = by_id or default_by_id()
+    links: dict[Path, Path] = {}
+    for link in (*adapter_links(folder), *adapter_links(by_path(folder))):
+        if link.exists():
+            links.setdefault(link.resolve(), link)
+    return sorted(map(SerialAdapter.at, links.values()), key=lambda one: one.serial)
 
 
 def adapter_links(folder: Path) -> list[Path]:

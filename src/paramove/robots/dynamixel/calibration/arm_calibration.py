@@ -86,7 +86,7 @@ class JointCalibration(_Part):
 
 
 class CalibratedBus(_Part):
-    """The adapter by its USB serial number, and the servos' baud rate, bit/s."""
+    """The adapter by its USB serial number, or what identifies it without one, and the servos' baud rate, bit/s."""
 
     serial: str = Field(min_length=1)
     baud_rate: int = Field(gt=0)

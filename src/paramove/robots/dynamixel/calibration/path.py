@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import os
 import re
+import shutil
 from pathlib import Path
 
 from platformdirs import user_data_path
@@ -16,11 +18,24 @@ def calibration_path(serial: str, data: Path | None = None) -> Path:
     """Where the calibration of the arm behind this adapter is stored.
 
     Args:
-        serial: USB serial number of the adapter.
+        serial: USB serial number of the adapter, or what takes its place.
         data: Folder; default $PARAMOVE_DATA, else that of the system for the user's data.
     """
     folder = data or Path(os.environ.get(DATA_VARIABLE) or user_data_path("paramove"))
     return folder / "calibration" / f"arm_{re.sub(r'[^A-Za-z0-9.-]', '_', serial)}.yaml"
+
+
+def keep_earlier(path: Path) -> Path | None:
+    """Copy a calibration that is about to be replaced to a new file beside it; None where there is none.
+
+    Raises OSError.
+    """
+    if not path.exists():
+        return None
+    numbers = itertools.count(1)
+    kept = next(other for number in numbers if not (other := path.with_suffix(f".{number}.yaml")).exists())
+    shutil.copy2(path, kept)
+    return kept
 
 
 def check_writable(path: Path) -> None:

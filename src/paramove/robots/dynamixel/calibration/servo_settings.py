@@ -95,6 +95,22 @@ def compare(chain: ServoChain, calibration: ArmCalibration, plan: ArmPlan | None
     return differences
 
 
+def is_same_arm(chain: ServoChain, calibration: ArmCalibration) -> bool:
+    """Whether some servo is set as the file has it: none is in an arm of another calibration, or of none.
+
+    Limits of positions are measured, so that arms have others; servos without such limits are asked only where all are.
+    Raises ServoError.
+    """
+    joints = calibration.joints.values()
+    measured = [joint for joint in joints if joint.operating_mode == POSITION_MODE] or joints
+    for joint in measured:
+        pinged = chain.ping(joint.id)
+        is_its_model = pinged is not None and pinged.model_number == model_named(joint.model).number
+        if is_its_model and read_settings(chain, joint) == settings(joint):
+            return True
+    return False
+
+
 def adopted(chain: ServoChain, calibration: ArmCalibration) -> ArmCalibration:
     """The calibration with firmware, operating modes and limits as the servos have them.
 
