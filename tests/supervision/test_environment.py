@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -187,3 +188,19 @@ def test_what_the_folder_replaces_is_named_at_the_start(workspace):
     answer = launch("test", cwd=workspace.root)
     assert answer.returncode == 0, answer.stderr
     assert re.search(r"^replaced there: .*nodes/camera\.py$", answer.stdout, re.MULTILINE)
+
+
+@pytest.mark.parametrize("where", ["nodes", "the folder itself"])
+def test_a_name_that_is_no_text_stops_no_run(tmp_path, where):
+    name = os.fsdecode(b"cell_\xff")
+    root = tmp_path / name if where == "the folder itself" else tmp_path
+    shutil.copytree(ROOT / "tests/supervision/nodes", root / "nodes")
+    (root / "launch").mkdir()
+    (root / "launch" / "test.yaml").write_text(
+        "nodes: {main: {module: nodes.silent_actor, ends_run: true, parameters: {lasts_s: 0.1}}}"
+    )
+    if root == tmp_path:
+        (root / where / f"{name}.py").write_text("")
+    answer = launch("test", cwd=root)
+    assert answer.returncode == 0, answer.stderr
+    assert "exit_code: 0" in (root / "runs" / "latest" / "run.yaml").read_text()

@@ -8,6 +8,7 @@ write is left out, see `trust`.
 from __future__ import annotations
 
 import hashlib
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -102,7 +103,7 @@ class Workspace:
         digest = hashlib.sha256()
         for name, file in self.files().items():
             content = file.read_bytes()
-            digest.update(b"%s\0%d\0%s" % (name.encode(), len(content), content))
+            digest.update(b"%s\0%d\0%s" % (os.fsencode(name), len(content), content))
         return digest.hexdigest()[:12]
 
     def __str__(self) -> str:
