@@ -30,6 +30,8 @@ def installed(tmp_path):
             metadata = f"Metadata-Version: 2.1\nName: {name.replace('_', '-')}\nVersion: {version}\n"
             if name == "paramove":
                 metadata += f"Requires-Dist: {OPENCV}<5,>=4.12\n"
+            if name == "mediapipe":
+                metadata += "Requires-Dist: OpenCV_Python\n"
             (folder / "METADATA").write_text(metadata)
             owned = "cv2" if name.startswith("opencv") else name
             (folder / "RECORD").write_text(f"LICENSE,,\n{owned}/__init__.py,,\n")
@@ -75,15 +77,16 @@ def test_what_an_interrupted_pip_left_is_passed_over_and_paramove_must_be_there(
 
 
 def test_two_packages_that_hold_cv2_are_told_and_mended(installed, monkeypatch):
-    found = installed(opencv_contrib_python_headless="4.14", opencv_python="4.12", numba="0.68", paramove="0.1.0")
+    found = installed(opencv_contrib_python_headless="4.14", opencv_python="4.12", mediapipe="0.10", paramove="0.1.0")
     finding = opencv_finding(found, VERSION)
     assert finding.level is Level.PROBLEM
+    assert f"{OPENCV} (of paramove) and opencv-python (of mediapipe) both" in finding.detail
     calls = []
     monkeypatch.setattr(subprocess, "run", lambda command, **_: calls.append(" ".join(command[1:])))
     finding.fix.do()
     assert calls == [
-        f"-m pip uninstall -y {OPENCV} opencv-python",
-        f"-m pip install --force-reinstall --no-deps {OPENCV}<5,>=4.12",
+        f"-P -m pip uninstall -y {OPENCV} opencv-python",
+        f"-P -m pip install --force-reinstall --no-deps {OPENCV}<5,>=4.12",
     ]
 
 

@@ -154,7 +154,7 @@ def test_wrong_files_of_servos_are_refused_with_the_reason(tmp_path: Path, old: 
     ("model", "reason"),
     [
         ("xl430_w250", "grip_current_ma.*xl430_w250.*controls no current.*xm430_w350"),
-        ("xl430_w300", "'xl430_w300', which is no model of a servo.* known are .*xl430_w250"),
+        ("xl430_w300", "'xl430_w300', a servo whose registers are not known.* known are .*xl430_w250"),
     ],
 )
 def test_servos_that_do_not_exist_or_control_no_current_are_named(tmp_path: Path, model: str, reason: str) -> None:

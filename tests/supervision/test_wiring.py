@@ -32,6 +32,14 @@ def test_topics_with_a_speaker_pass(workspace):
     assert clock_publisher(interfaces) is None
 
 
+def test_one_cause_in_the_parameters_of_several_nodes_is_one_finding(workspace):
+    ear = "{module: nodes.listener, parameters: {loudness: x}}"
+    with pytest.raises(DocumentError) as error:
+        checked(workspace, f"nodes:\n  robot: {{module: nodes.actor}}\n  left: {ear}\n  right: {ear}")
+    assert len(list(error.value)) == 1
+    assert "'left' and 'right': loudness: " in str(error.value)
+
+
 @pytest.mark.parametrize(
     ("text", "place", "message"),
     [
@@ -53,7 +61,7 @@ def test_topics_with_a_speaker_pass(workspace):
         (
             "nodes:\n  a: {module: nodes.actor}\n  ear: {module: nodes.listener, parameters: {loudnes: 2}}",
             "3:46",
-            "'ear' has no parameter 'loudnes'; did you mean 'loudness'?",
+            "'ear': there is no parameter 'loudnes'; did you mean 'loudness'?",
         ),
         (
             "nodes:\n  a: {module: nodes.actor}\n  ear: {module: nodes.listener, remaps: {speach: x}}",

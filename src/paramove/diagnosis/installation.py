@@ -91,7 +91,8 @@ def opencv_finding(installed: Iterable[Distribution], script: str = IMPORT_CV2) 
     owners = sorted({one.name for one in packages if _owns_cv2(one)})
     again = ("install", "--force-reinstall", "--no-deps", _required_opencv(packages))
     if len(owners) > 1:
-        message = f"{' and '.join(owners)} both install cv2: the later one has overwritten the other"
+        named = " and ".join(f"{owner}{_required_by(owner, packages)}" for owner in owners)
+        message = f"{named} both install cv2: the later one has overwritten the other"
         return _fixed_by_pip("opencv", message, [("uninstall", "-y", *owners), again])
     try:
         done = subprocess.run(
@@ -108,6 +109,16 @@ def opencv_finding(installed: Iterable[Distribution], script: str = IMPORT_CV2) 
 def _owns_cv2(package: Distribution) -> bool:
     record = package.read_text("RECORD") or ""
     return record.startswith("cv2/") or "\ncv2/" in record
+
+
+def _required_by(name: str, installed: Iterable[Distribution]) -> str:
+    """Which other packages brought this one, in brackets; "" if none did."""
+    names = sorted(
+        package.name
+        for package in installed
+        if any(canonicalize_name(Requirement(text).name) == canonicalize_name(name) for text in package.requires or ())
+    )
+    return f" (of {', '.join(names)})" if names else ""
 
 
 def _required_opencv(installed: Iterable[Distribution]) -> str:

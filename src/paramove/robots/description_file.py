@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from paramove.documents import InputError, findings, nearest, read_document
+from paramove.documents import InputError, findings, read_document
 from paramove.workspace import Workspace
 
 POSITION_MODE_MAXIMUM = 4095
@@ -286,8 +286,8 @@ def _check_models(path: Path, file: RobotFile) -> None:
     for joint in file.joints:
         if joint.motor not in MODELS:
             raise DescriptionError(
-                f"{path}: joint {joint.name} has motor {joint.motor!r}, which is no model of a servo; "
-                f"{nearest(joint.motor, MODELS)}; known are {', '.join(MODELS)}"
+                f"{path}: joint {joint.name} has motor {joint.motor!r}, a servo whose registers are not known here; "
+                f"known are {', '.join(MODELS)}, and none of them stands in for another"
             )
         is_gripper = gripper is not None and gripper.joint == joint.name
         if is_gripper and current is not None and MODELS[joint.motor].current_unit is None:

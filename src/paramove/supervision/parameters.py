@@ -50,12 +50,16 @@ def wrong_parameters(
     if passed is not None and passed.is_file():
         return
     answers = _check_in_process(to_check, workspace)
+    rejecting: dict[tuple[tuple[str, ...], str], list[str]] = {}
     for (name, module, _), answer in zip(to_check, answers, strict=False):
         if isinstance(answer, str):
             yield launch.error(("nodes", name, "module"), f"'{module}' cannot be imported: {answer}")
             continue
         for path, message in answer:
-            yield launch.error(("nodes", name, "parameters", *path), message)
+            rejecting.setdefault((tuple(path), message), []).append(name)
+    for (path, message), names in rejecting.items():
+        named = " and ".join(f"'{name}'" for name in names)
+        yield launch.error(("nodes", names[0], "parameters", *path), f"{named}: {message}")
     if passed is not None and answers == [[]] * len(to_check):
         with contextlib.suppress(OSError):  # not writable: the next launch checks again
             passed.parent.mkdir(parents=True, exist_ok=True)
@@ -86,7 +90,7 @@ def _check_in_process(to_check: Sequence[_ToCheck], workspace: Workspace) -> lis
     return answers if len(answers) == len(to_check) else [*answers, ending]
 
 
-def _answer(node: str, module: str, parameters: dict[str, Any]) -> str | list[tuple[list[str], str]]:
+def _answer(module: str, parameters: dict[str, Any]) -> str | list[tuple[list[str], str]]:
     """Position and message of each error in the parameters, or why the module cannot be imported."""
     try:
         config = getattr(importlib.import_module(module), "Config", None)
@@ -97,27 +101,27 @@ def _answer(node: str, module: str, parameters: dict[str, Any]) -> str | list[tu
     try:
         config.model_validate(parameters)
     except ValidationError as error:
-        return [_finding(node, config, details) for details in error.errors()]
+        return [_finding(config, details) for details in error.errors()]
     return []
 
 
-def _finding(node: str, config: type[BaseModel], details: ErrorDetails) -> tuple[list[str], str]:
+def _finding(config: type[BaseModel], details: ErrorDetails) -> tuple[list[str], str]:
     path = [str(part) for part in details["loc"]]
     parameter = ".".join(path)
     if details["type"] in ("extra_forbidden", "unexpected_keyword_argument"):  # the second of dataclasses
-        return path, f"'{node}' has no parameter '{parameter}'; {nearest(path[-1], keys_at(config, path[:-1]))}"
+        return path, f"there is no parameter '{parameter}'; {nearest(path[-1], keys_at(config, path[:-1]))}"
     if details["type"] == "missing":
-        return path, f"'{node}' needs the parameter '{parameter}'"
+        return path, f"the parameter '{parameter}' is missing"
     reason = details["msg"].removeprefix("Value error, ")
     reason = f"{reason[:1].lower()}{reason[1:]}, found {details['input']!r:.200}"
-    return path, f"'{node}' rejects {parameter or 'its parameters'}: {reason}"
+    return path, f"{parameter or 'the parameters'}: {reason}"
 
 
 def main() -> None:
     """Reads nodes, modules and parameters from standard input; writes an answer per line as JSON."""
     answers, sys.stdout = sys.stdout, sys.stderr  # so that output of a module does not mix with the answers
-    for node, module, parameters in json.load(sys.stdin):
-        answers.write(json.dumps(_answer(node, module, parameters)) + "\n")
+    for _, module, parameters in json.load(sys.stdin):
+        answers.write(json.dumps(_answer(module, parameters)) + "\n")
         answers.flush()
 
 
