@@ -14,8 +14,9 @@ import zmq
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.bus import LATEST_NS, Envelope, pack, schema_hash, topics
-from paramove.hosts import HostKeyError, HostKeys, link
+from paramove.hosts import HostKeyError, HostKeys, link, relay
 from paramove.hosts.link import Gatekeeper
+from paramove.hosts.own_time import in_own_time
 from paramove.msgs.clock_pb2 import TickDone
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.rule_pb2 import Rule, Rules, Speech
@@ -132,10 +133,10 @@ def test_what_a_trusted_host_may_not_give_is_rejected_and_counted(two_hosts):
     hosts.start()
     here = hosts.relays["here"]
     offer = here._offers[0]
-    hosts.until(lambda: offer.askers)
+    hosts.until(lambda: len(offer.askers) == 2)  # one of them for what is urgent
     for asker in offer.askers.values():
         offer.send(asker, link.Content(topic="arm/trajectory"), bytes(56), b"anything")
-    hosts.until(lambda: "1 rejected" in hosts.relays["there"].detail)
+    hosts.until(lambda: "2 rejected" in hosts.relays["there"].detail)
     assert not moves.welcomed
 
 
@@ -278,6 +279,40 @@ def test_what_persons_request_elsewhere_leaves_the_topic_to_those_here(two_hosts
     hosts.until(lambda: time.monotonic() > begun_s + 0.5, arms.serve, stops.serve)
     assert armed.receive() is None
     assert stopped.receive() is None
+
+
+def test_a_stop_overtakes_trajectories_on_their_way_to_another_host(two_hosts, monkeypatch):
+    """All of it has left the one host before the other reads anything."""
+    hosts = two_hosts((topics.ARM_TRAJECTORY, topics.OPERATOR_ESTOP), real_time=True)
+    here, there = hosts.visitor("here"), hosts.visitor("there")
+    moves, stops = here.publisher(topics.ARM_TRAJECTORY), here.publisher(topics.OPERATOR_ESTOP)
+    moved, stopped = there.subscriber(topics.ARM_TRAJECTORY), there.subscriber(topics.OPERATOR_STOP_AWAY)
+    hosts.start()
+    serving = (moves.serve, stops.serve)
+    offer = hosts.relays["here"]._offers[0]
+    hosts.until(lambda: sum(len(one.wanted) for one in offer.askers.values()) == 2, *serving)
+    hosts.until(lambda: moved.welcomed, *serving, moved.receive)
+    forwarded = []
+
+    def recorded(topic, *arguments):
+        forwarded.append(topic.name)
+        return in_own_time(topic, *arguments)
+
+    monkeypatch.setattr(relay, "in_own_time", recorded)
+    long = JointTrajectory(id="long")
+    for number in range(30_000):
+        long.points.add().time_s = 0.01 * number
+    now_ns = time.monotonic_ns()
+    for _ in range(10):
+        moves.publish(long, now_ns, now_ns)
+    stops.publish(StopRequest(source="terminal"), now_ns, now_ns)
+    sources = hosts.relays["here"]._sources.values()
+    hosts.until(lambda: all(one.subscriber.counter.messages for one in sources), *serving, only="here")
+    begun_s = time.monotonic()
+    hosts.until(lambda: time.monotonic() > begun_s + 0.5, only="here")  # until it has crossed
+    hosts.until(lambda: forwarded.count("arm/trajectory") == 10, only="there")
+    assert forwarded.index("operator/estop") <= 1
+    hosts.until(stopped.receive, stopped.revive)
 
 
 class Proxy:

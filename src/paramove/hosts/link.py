@@ -5,7 +5,7 @@ alone: it is pinned, so no host can take another one's place, and gets only what
 a host gives is checked against the topics that may come from it. The first frame is one of the messages below:
 
     Want      names of topics                        asker to offerer, five times a second
-    Beat      time of sending                        asker to offerer, 10 times a second, 100 for commands
+    Beat      time of sending                        asker to offerer, 10 times a second, 100 for what is urgent
     Beat      that time, time of the reply           the reply, each by its own host's monotonic clock
     Content   topic; header, payload                 offerer to asker; header and payload are those of the bus
     Taken     topic                                  asker to offerer: an image has arrived, send the next
@@ -40,7 +40,7 @@ MAX_ASKED_BYTES = 65_536
 MOST_AT_ONCE = 100
 """Messages read from one socket before the others have their turn."""
 MOST_CONNECTIONS = 8
-"""Of one host at once: one, and those that it has left in the last `LOST_S`."""
+"""Of one host at once: two, and those that it has left in the last `LOST_S`."""
 _log = logging.getLogger(__name__)
 
 Nanoseconds = Annotated[int, Field(ge=0, le=LATEST_NS)]
@@ -281,7 +281,7 @@ class Request:
         host: Its name.
         rejections: Counts what may not come from there.
         max_bytes: Of a frame.
-        beat_s: Time between two beats; default: where no command waits for it.
+        beat_s: Time between two beats; default: where nothing urgent waits for it.
 
     Attributes:
         clock: That of the other host.

@@ -3,8 +3,9 @@
 A topic's messages keep epoch and sequence of their publisher, so that a subscriber on another host counts what is lost
 exactly as one on the same host. Times become those of this host's clock. What a person requests at another host is
 published as the relay's own, as the topic is this host's persons'. While the hosts reply from which the arm's commands
-come, the relay reports that to the arm's driver. Images have a connection of their own, so that they never delay a
-stop, and only the latest one waits for a slow link. In lockstep the members' answers cross as well: the simulator's
+come, the relay reports that to the arm's driver. What stops an arm, or keeps it going, has a connection of its own and
+is forwarded before and between all else, so that nothing delays a stop. So have images, of which only the latest one
+waits for a slow link. In lockstep the members' answers cross as well: the simulator's
 host watches the relay in place of a member, and the relay on the member's host reports its end.
 """
 
@@ -16,7 +17,7 @@ import math
 import os
 import select
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 import zmq
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
@@ -70,6 +71,20 @@ _LOOK_S = 0.25
 _log = logging.getLogger(__name__)
 
 
+class _Lanes(NamedTuple):
+    """Connections to one host, in the order in which they are read: one of them never waits for another's messages.
+
+    Attributes:
+        urgent: Requests to stop and to arm. By its replies the link is watched.
+        topics: All other topics but images.
+        images: They come from an offer of their own.
+    """
+
+    urgent: Request
+    topics: Request
+    images: Request
+
+
 class Relay:
     """One host's relay, while it is a context.
 
@@ -104,7 +119,7 @@ class Relay:
         self._foreign = [offer.foreign for offer in self._offers]
         self._real_time = bus.settings.clock == "monotonic"
         beat_s = BEAT_S if self._real_time else IMAGES_BEAT_S
-        self._requests: dict[str, tuple[Request, Request]] = {}
+        self._requests: dict[str, _Lanes] = {}
         self._topics: dict[str, Topic] = {}
         self._sources: dict[str, _Source] = {}
         self._publishers: dict[str, Publisher] = {}
@@ -113,13 +128,16 @@ class Relay:
             self._topics |= rows
             for name in peer.wants.keys() - self._sources.keys():  # a topic may cross to several hosts
                 self._sources[name] = _Source(self._here, bus, rows[name], name)
+            urgent = frozenset(name for name in peer.gives if rows[name].is_urgent)
             images = frozenset(name for name in peer.gives if rows[name].is_image)
             largest = max((rows[name].max_bytes for name in peer.gives), default=0)
             reach = host, self._rejections, max(largest, MAX_ASKED_BYTES)
-            self._requests[host] = (
-                Request(away, peer.port, own, peer, frozenset(peer.gives) - images, *reach, beat_s),
+            self._requests[host] = _Lanes(
+                Request(away, peer.port, own, peer, urgent, *reach, beat_s),
+                Request(away, peer.port, own, peer, frozenset(peer.gives) - urgent - images, *reach),
                 Request(away, peer.port + 1, own, peer, images, *reach),
             )
+        self._urgent = tuple(source for source in self._sources.values() if source.topic.is_urgent)
         bus.exchange.forwards(self._sources)
         self._answers: _Answers | None = None
         if settings.clock_from is not None:
@@ -146,11 +164,14 @@ class Relay:
     @property
     def trouble(self) -> str:
         """Which links are down, and of which hosts the clock is not known well; "" if there are none."""
-        down = [host for host, (request, _) in self._requests.items() if not request.is_up]
+        down = [host for host, lanes in self._requests.items() if not (lanes.urgent.is_up and lanes.topics.is_up)]
         if down:
             return f"no link to {', '.join(down)}"
         now_ns, allowed_ms = time.monotonic_ns(), 1e-6 * LARGEST_BOUND_NS
-        bounds_ms = {host: 1e-6 * data.clock.bound_ns(now_ns) for host, (data, _) in self._requests.items()}
+        bounds_ms = {
+            host: 1e-6 * max(lanes.urgent.clock.bound_ns(now_ns), lanes.topics.clock.bound_ns(now_ns))
+            for host, lanes in self._requests.items()
+        }
         return "; ".join(
             f"the clock of {host} is known to {bound_ms:.0f} ms, allowed {allowed_ms:g} ms: its commands are rejected"
             for host, bound_ms in bounds_ms.items()
@@ -160,8 +181,8 @@ class Relay:
     def _links(self) -> str:
         rejected = self._gate.rejected + self._rejections.total
         links = [
-            f"{host}: {_milliseconds(data.round_trip_s)}{_about(data.clock) if self._real_time else ''}"
-            for host, (data, _) in sorted(self._requests.items())
+            f"{host}: {_milliseconds(lanes.urgent.round_trip_s)}{_about(lanes.urgent.clock) if self._real_time else ''}"
+            for host, lanes in sorted(self._requests.items())
         ]
         more = [f"{rejected} rejected"] if rejected else []
         blocked = sum(offer.blocked for offer in self._offers)
@@ -178,9 +199,11 @@ class Relay:
         for publisher in self._publishers.values():
             if publisher.socket in ready:
                 publisher.serve()
+        self._forward_urgent()
         for source in self._sources.values():
             for envelope, payload in source.messages() if source.subscriber.socket in ready else ():
                 self._send_all(source, envelope, payload)
+                self._forward_urgent()
         for offer in self._offers:
             for asker, message, behind, new in offer.requests() if offer.socket in ready else ():
                 if isinstance(message, Answered):
@@ -189,18 +212,19 @@ class Relay:
                     self._taken(offer, asker, message.topic)
                 for name in sorted(new):
                     self._greet(offer, asker, self._sources[name])
-        for host, requests in self._requests.items():
-            for request in requests:
+        for host, lanes in self._requests.items():
+            for request in (lanes.topics, lanes.images):
                 for name, header, payload in request.messages() if request.socket in ready else ():
                     self._publish(request, host, name, header, payload)
+                    self._forward_urgent()
         self._report_link()
         if self._answers is not None and self._settings.clock_from is not None:
-            request = self._requests[self._settings.clock_from][0]
+            request = self._requests[self._settings.clock_from].topics
             for header, payload in self._answers.collect() if request.is_up else ():
                 request.send(Answered(), header, payload)
 
     def _each_request(self) -> list[Request]:
-        return [request for pair in self._requests.values() for request in pair]
+        return [request for lanes in self._requests.values() for request in lanes]
 
     def _ends(self) -> list[Subscriber | Request]:
         """Those that receive, and that may have to be opened anew."""
@@ -218,6 +242,15 @@ class Relay:
             foreign.look()
         for offer in self._offers:
             offer.forget_silent()
+
+    def _forward_urgent(self) -> None:
+        """Both ways, all that there is; called between any two other messages."""
+        for source in self._urgent:
+            for envelope, payload in source.messages():
+                self._send_all(source, envelope, payload)
+        for host, lanes in self._requests.items():
+            for name, header, payload in lanes.urgent.messages():
+                self._publish(lanes.urgent, host, name, header, payload)
 
     # -- what others want ---------------------------------------------------------------------------------------------
 
@@ -273,8 +306,7 @@ class Relay:
             if topic.is_image and not envelope.is_welcome:
                 request.send(Taken(topic=name))
             if self._real_time and envelope.has_message:
-                clock = self._requests[host][0].clock
-                envelope, message = in_own_time(topic, envelope, payload, clock, now_ns)
+                envelope, message = in_own_time(topic, envelope, payload, request.clock, now_ns)
             elif away is not None and envelope.has_message:
                 message = decoded(topic, payload)
         except (RejectedError, UnknownTimeError) as error:
@@ -301,7 +333,7 @@ class Relay:
 
     def _report_link(self) -> None:
         """Once all hosts that command have answered a later request."""
-        confirmed_ns = min((self._requests[host][0].confirmed_ns for host in self._link.hosts), default=0)
+        confirmed_ns = min((self._requests[host].urgent.confirmed_ns for host in self._link.hosts), default=0)
         if confirmed_ns > self._confirmed_ns:
             self._confirmed_ns = confirmed_ns
             self._link.captured.FromNanoseconds(confirmed_ns)
