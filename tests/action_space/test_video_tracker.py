@@ -112,6 +112,7 @@ def test_the_same_images_give_the_same_estimates(parameters):
         np.testing.assert_array_equal(one.estimate.pose, other.estimate.pose)
 
 
+@pytest.mark.usefixtures("parameters")
 def test_files_of_the_run_come_before_those_of_the_workspace(folder, tmp_path):
     setup = TrackingSetup.model_validate({"cameras": "cameras.yaml", "actions": (str(folder / "pointing.npz"),)})
     assert list(setup.video_tracker(folder).cameras) == ["camera_1", "camera_2"]

@@ -264,6 +264,7 @@ def test_what_persons_request_elsewhere_leaves_the_topic_to_those_here(two_hosts
     arms, stops = here.publisher(topics.OPERATOR_ARM), here.publisher(topics.OPERATOR_ESTOP)
     armed, stopped = there.subscriber(topics.OPERATOR_ARM_AWAY), there.subscriber(topics.OPERATOR_STOP_AWAY)
     hosts.start()
+    hosts.until(lambda: not hosts.relays["there"].trouble, arms.serve)  # until its clock is known well
     now_ns = time.monotonic_ns()
     arms.publish(ArmRequest(source="terminal", armed=True, by_person=True), now_ns, now_ns)
     received = hosts.until(armed.receive, arms.serve)

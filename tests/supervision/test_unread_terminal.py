@@ -85,7 +85,7 @@ def test_more_signals_at_such_a_terminal_leave_no_process(workspace, stuck):
         return launcher.poll() is not None
 
     until(ended, "the launcher has ended")
-    assert workspace.processes() == {}
+    until(lambda: workspace.processes() == {}, "no process is left, nor the guard")
 
 
 def test_the_guard_kills_before_it_prints(workspace, stuck):

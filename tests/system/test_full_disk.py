@@ -12,12 +12,12 @@ from tests.system.test_connect_your_arm import EMULATED, heard
 @pytest.mark.slow
 def test_a_run_goes_on_over_a_full_disk_and_the_recording_after_it(launcher, tmp_path):
     with small_disk(tmp_path / "disk", 200) as launcher.folder:
-        process = launcher.start(*EMULATED.split()[2:])
+        process = launcher.start(*EMULATED.split()[2:], "--headless")
         heard(process, "task 1 of 2")
         filler = fill(launcher.folder)
         heard(process, "task 2 of 2")
         filler.unlink()
-        shown = process.communicate(timeout=120)[0]
+        shown = process.communicate(timeout=300)[0]
         assert process.returncode == 0, shown
         assert "SUCCESS: 2 of 2 tasks done" in shown
         events = [json.loads(line) for line in (launcher.latest / "events.jsonl").read_text().splitlines()]
