@@ -27,7 +27,7 @@ from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from sim.emulated_arm import emulated_servos
 from tests.robots.dynamixel.person import Person
-from tests.robots.dynamixel.untrue_replies import OneElsewhere
+from tests.robots.dynamixel.untrue_replies import OneAsTheNext, OneElsewhere
 
 SETTINGS = LoopSettings(timeouts=Timeouts(silent_s=2.0, watchdog_s=2.54, read_s=1.0))
 """Other programs may keep the emulator waiting, and the test."""
@@ -180,6 +180,21 @@ def test_a_stop_ends_the_movement_and_only_a_new_word_arms_again(person):
     assert person.memory("Torque Enable") == [1] * 5
     person.arms()
     person.waits_for("ARMED")
+
+
+def test_a_stop_waits_for_no_position_that_is_withheld(person):
+    """In every eighth exchange a servo's reply is lost, and another one has its ID."""
+    person.arms_and_waits()
+    person.port.latency_s = 0.02
+    person.moves()
+    faults = OneAsTheNext(8)
+    person.emulator.faults = faults
+    person.hears_until(lambda: faults.exchanges > 40)
+    before = faults.exchanges
+    person.arm.on_stop(StopRequest(source="page"))
+    person.waits_for("HOLD")
+    assert person.is_told("STOPPED").reason == "stopped from the page by a person"
+    assert faults.exchanges - before <= 40, "the ramp takes 20"
 
 
 def by_file(folder):
