@@ -153,7 +153,7 @@ def check_paramove(words):
 
 def asked_here(asked, workspace):
     """Findings of the nodes' own Config, asked here; `tests/system/test_launch_files.py` asks it in a process."""
-    return [parameters._answer(*one) for one in asked]
+    return [parameters._answer(module, given) for _, module, given in asked]
 
 
 def check_python(words):

@@ -399,8 +399,10 @@ def test_packets_that_are_sent_again_are_worth_nothing(two_hosts):
     proxy.cut()
     hosts.until(lambda: proxy.replayed > 1 and hosts.relays["there"].trouble == "no link to here", serve)
     assert received == ["move"]
+    offer = hosts.relays["here"]._offers[0]
+    hosts.until(lambda: not offer.askers, serve)  # those of the cut link are forgotten
     proxy.replays = False
-    hosts.until(lambda: any(asker.wanted for asker in hosts.relays["here"]._offers[0].askers.values()), serve)
+    hosts.until(lambda: any(asker.wanted for asker in offer.askers.values()), serve)
     published.publish(Speech(text="again"), 1, 1)
     hosts.until(lambda: received == ["move", "again"], serve)
     proxy.close()
