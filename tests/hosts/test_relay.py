@@ -453,7 +453,7 @@ class OtherHost:
 
 @pytest.fixture
 def other_host(two_hosts):
-    hosts = two_hosts((topics.RULES,), (topics.SPEECH, topics.ARM_TRAJECTORY), real_time=True)
+    hosts = two_hosts((topics.RULES,), (topics.SPEECH, topics.ARM_TRAJECTORY, topics.OPERATOR_ARM), real_time=True)
     members = hosts.settings["here"].peers["there"].model_copy(update={"members": ("tracker",)})
     hosts.settings["here"] = hosts.settings["here"].model_copy(update={"peers": {"there": members}})
     hosts.start("here")
@@ -478,6 +478,24 @@ def test_an_impossible_time_is_rejected_and_ends_nothing(other_host, seconds):
     other_host.give(beat.line())
     other_host.give(link.Content(topic="arm/trajectory").line(), *trajectory(seconds))
     hosts.until(lambda: "1 rejected" in hosts.relays["here"].detail)
+
+
+@pytest.mark.parametrize("captured", [{"seconds": 2**62}, {"seconds": -1}, {"nanos": 2**31 - 1}, {"nanos": -1}])
+def test_an_impossible_time_in_a_request_to_arm_is_rejected_and_ends_nothing(other_host, captured):
+    hosts = other_host.hosts
+    payload = ArmRequest(armed=True, by_person=True, captured=captured).SerializeToString()
+    now_ns = time.monotonic_ns()
+    header = pack(Envelope(schema_hash(ArmRequest), 1, 2, 3, now_ns, now_ns), payload)
+
+    def beat():
+        now_ns = time.monotonic_ns()
+        other_host.give(link.Beat(sent_ns=now_ns, there_ns=now_ns).line())
+
+    clock = hosts.relays["here"]._requests["there"].urgent.clock
+    hosts.until(lambda: clock.bound_ns(time.monotonic_ns()) < 5e6, beat)
+    for _ in range(20):  # to both connections; that of the other topics rejects it as one that may not come there
+        other_host.give(link.Content(topic="operator/arm").line(), header, payload)
+    hosts.until(lambda: "20 rejected" in hosts.relays["here"].detail)
 
 
 @pytest.mark.parametrize("time_ns", [-(2**63), -LATEST_NS - 1, 2**63 - 1])

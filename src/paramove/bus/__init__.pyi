@@ -44,6 +44,7 @@ from .settings import default_folder as default_folder
 from .settings import lock_of as lock_of
 from .settings import nodes_in as nodes_in
 from .soundness import LATEST_NS as LATEST_NS
+from .soundness import impossible_time as impossible_time
 from .soundness import unsound as unsound
 from .subscriber import Received as Received
 from .subscriber import Subscriber as Subscriber

@@ -6,7 +6,7 @@ from typing import Any
 
 from google.protobuf.descriptor import Descriptor, FieldDescriptor  # type: ignore[import-untyped]
 
-from paramove.bus import LATEST_NS, Envelope, Reason, RejectedError, Topic, decoded, topics
+from paramove.bus import LATEST_NS, Envelope, Reason, RejectedError, Topic, decoded, impossible_time, topics
 from paramove.hosts.clock_offset import ClockOffset
 
 LARGEST_BOUND_NS = 5_000_000
@@ -44,6 +44,9 @@ def in_own_time(
     moves = topic.type is topics.ARM_TRAJECTORY.type or (topic.type is topics.OPERATOR_ARM.type and message.armed)
     if bound_ns == float("inf") or (moves and bound_ns > LARGEST_BOUND_NS):
         raise UnknownTimeError(f"the clock there is known to {1e-6 * bound_ns:.1f} ms only, so its age is not known")
+    impossible = impossible_time(message)
+    if impossible:  # of a request to arm, whose numbers are not checked where it is decoded
+        raise RejectedError(Reason.NUMBER, f"{impossible}, which never was")
     ahead_ns = clock.offset_ns(now_ns)
     _set_back(message, ahead_ns)
     moved = envelope._replace(
