@@ -14,8 +14,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter,
 from paramove.documents.wording import findings, printable
 
 MAX_DEPTH = 24
+MAX_PARTS = 20_000
+"""Texts, commas and brackets of a message; the largest launch file of this project has 500. Each may be an error, and
+pydantic needs 10 µs and 1 kB for each."""
 LONGEST_TEXT = 2000
-_NESTING = re.compile(rb'"(?:[^"\\]++|\\.)*+"?|[\[{]|[]}]', re.DOTALL)
+_PARTS = re.compile(rb'"(?:[^"\\]++|\\.)*+"?|[\[{]|[]}]|,', re.DOTALL)
 
 
 class Message(BaseModel):
@@ -36,12 +39,17 @@ class MessageError(ValueError):
     """
 
     def __init__(self, reason: str, content: bytes = b"") -> None:
-        super().__init__(printable(reason)[:LONGEST_TEXT])
+        super().__init__(_cut(reason))
         self.content = printable(content[:200].decode("utf-8", "replace"))[:80]
 
 
 def _printable(value: Any) -> Any:
-    return printable(value)[:LONGEST_TEXT] if isinstance(value, str) else value
+    return _cut(value) if isinstance(value, str) else value
+
+
+def _cut(text: str) -> str:
+    """The text printable, and cut before and after: an escape is longer than what it stands for."""
+    return printable(text[:LONGEST_TEXT])[:LONGEST_TEXT]
 
 
 def _printable_lines(value: Any) -> Any:
@@ -64,10 +72,13 @@ class MessageReader(Generic[Kind]):
     Args:
         kinds: Those that may come. If there are several, each has a field `kind` with a value of its own.
         max_bytes: Of a message.
+
+    Attributes:
+        kinds: As given.
     """
 
     def __init__(self, *kinds: type[Kind], max_bytes: int) -> None:
-        self.max_bytes = max_bytes
+        self.kinds, self.max_bytes = kinds, max_bytes
         several: Any = Annotated[Union[kinds], Field(discriminator="kind")]  # noqa: UP007 (made of a tuple)
         self._adapter: TypeAdapter[Kind] = TypeAdapter(several if len(kinds) > 1 else kinds[0])
 
@@ -75,25 +86,28 @@ class MessageReader(Generic[Kind]):
         """The message; raises MessageError for anything else."""
         if len(content) > self.max_bytes:
             raise MessageError(f"{len(content)} bytes, allowed are {self.max_bytes}", content)
-        if (depth := _depth(content)) > MAX_DEPTH:
-            raise MessageError(f"nested {depth} deep, allowed are {MAX_DEPTH}", content)
+        fault = _form_fault(content)
+        if fault:
+            raise MessageError(fault, content)
         try:
             return self._adapter.validate_json(content)
         except ValidationError as error:
             raise MessageError(findings(error), content) from error
 
 
-def _depth(content: bytes) -> int:
-    """How deep lists and objects are nested; at most their number, where that is allowed already."""
-    number = content.count(b"[") + content.count(b"{")
-    if number <= MAX_DEPTH:
-        return number
-    depth = deepest = 0
-    for match in _NESTING.finditer(content):
+def _form_fault(content: bytes) -> str:
+    """Whether lists and objects are nested too deep, or have too many parts; "" if neither."""
+    if content.count(b"[") + content.count(b"{") + content.count(b",") <= MAX_DEPTH:
+        return ""
+    depth = 0
+    for number, match in enumerate(_PARTS.finditer(content)):
+        if number == MAX_PARTS:
+            return f"more than {MAX_PARTS} parts"
         first = match[0][:1]
         if first in b"[{":
             depth += 1
-            deepest = max(deepest, depth)
+            if depth > MAX_DEPTH:
+                return f"nested more than {MAX_DEPTH} deep"
         elif first in b"]}":
             depth -= 1
-    return deepest
+    return ""
