@@ -475,9 +475,16 @@ class Outcome(NamedTuple):
     mebibytes: float
 
 
+def peak_mib(anew: bool = False) -> float:
+    """Largest resident memory of this process; from now on if it begins anew."""
+    if anew:
+        Path("/proc/self/clear_refs").write_text("5")
+    return int(re.findall(r"VmHWM:\s+(\d+)", Path("/proc/self/status").read_text())[0]) / 1024
+
+
 def attempt(read: Callable[[Path], object], path: Path) -> Outcome:
     """Reads a file in this process. Of a reader that yields between several calls the longest counts."""
-    Path("/proc/self/clear_refs").write_text("5")  # the peak of memory begins anew
+    peak_mib(anew=True)
     marks_s = [sum(os.times()[:4])]
     end, raised = "read", ""
     try:
@@ -488,10 +495,9 @@ def attempt(read: Callable[[Path], object], path: Path) -> Outcome:
         end, raised = "rejected", str(error)
     except Exception:
         end, raised = "traceback", traceback.format_exc()
-    peak = int(re.findall(r"VmHWM:\s+(\d+)", Path("/proc/self/status").read_text())[0])
-    peak = max(peak, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+    peak = max(peak_mib(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)
     marks_s.append(sum(os.times()[:4]))
-    return Outcome(end, raised, max(end_s - begin_s for begin_s, end_s in pairwise(marks_s)), peak / 1024)
+    return Outcome(end, raised, max(end_s - begin_s for begin_s, end_s in pairwise(marks_s)), peak)
 
 
 def _serve(files: Connection) -> None:

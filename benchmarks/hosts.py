@@ -14,6 +14,7 @@ import argparse
 import contextlib
 import json
 import multiprocessing
+import socket
 import sys
 import tempfile
 import time
@@ -39,7 +40,6 @@ COMMANDS = topics.WIRE_HOAP3_STREAM  # does not cross in a run; here it is a mes
 IMAGES = topics.CAMERA_IMAGE
 SETTLE_S = 2.0
 IMAGE_BYTES = 60_000
-FIRST_PORT = 47_200
 
 
 def relay(folder: str, name: str, settings: dict[str, Any], results: Connection) -> None:
@@ -74,12 +74,23 @@ def collect(subscribers: list[Any], latencies_ms: dict[str, list[float]]) -> Non
             latencies_ms[received.topic.name].append(1e-6 * (time.monotonic_ns() - received.captured_ns))
 
 
+def free_ports() -> int:
+    """A port that is free with the next one."""
+    while True:
+        with socket.socket() as one, socket.socket() as next_one:
+            one.bind(("127.0.0.1", 0))
+            port = int(one.getsockname()[1])
+            with contextlib.suppress(OSError, OverflowError):
+                next_one.bind(("127.0.0.1", port + 1))
+                return port
+
+
 @contextlib.contextmanager
 def hosts(root: Path, count: int) -> Iterator[tuple[Path, list[tuple[str, Path, dict[str, Any]]]]]:
     """Folder of the giving host, and name, folder and settings of each relay, the giving one first."""
     names = ["giver", *(f"host_{number}" for number in range(count))]
     keys = {name: HostKeys(root / name / "keys") for name in names}
-    ports = {name: FIRST_PORT + 2 * index for index, name in enumerate(names)}
+    ports = {name: free_ports() for name in names}
     rows = {topic.name: topic.name for topic in (COMMANDS, IMAGES)}
     relays = []
     for name in names:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import socket
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -12,20 +11,10 @@ from typing import Any, Literal
 
 import pytest
 
+from benchmarks.hosts import free_ports
 from paramove.bus import Bus, BusSettings, BusVisitor, Publisher, Subscriber, topics
 from paramove.bus.topics import Topic
 from paramove.hosts import HostKeys, Peer, Relay, RelaySettings
-
-
-def free_ports() -> int:
-    """A port that is free with the next one."""
-    while True:
-        with socket.socket() as one, socket.socket() as next_one:
-            one.bind(("127.0.0.1", 0))
-            port = int(one.getsockname()[1])
-            with contextlib.suppress(OSError, OverflowError):
-                next_one.bind(("127.0.0.1", port + 1))
-                return port
 
 
 class TwoHosts:

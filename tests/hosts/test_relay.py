@@ -10,18 +10,17 @@ import time
 
 import numpy as np
 import pytest
-import zmq
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
+from benchmarks.fuzz_protocols import RawHost
+from benchmarks.hosts import free_ports
 from paramove.bus import LATEST_NS, Envelope, pack, schema_hash, topics
 from paramove.hosts import HostKeyError, HostKeys, link, relay
-from paramove.hosts.link import Gatekeeper
 from paramove.hosts.own_time import in_own_time
 from paramove.msgs.clock_pb2 import TickDone
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.rule_pb2 import Rule, Rules, Speech
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
-from tests.hosts.conftest import free_ports
 
 
 def test_messages_arrive_as_they_were_published_each_once(two_hosts):
@@ -409,30 +408,13 @@ def test_packets_that_are_sent_again_are_worth_nothing(two_hosts):
     images.close()
 
 
-class OtherHost:
-    """A trusted host in other hands: raw sockets with its key, in place of its relay."""
+class OtherHost(RawHost):
+    """A trusted host in other hands, in place of the relay of there."""
 
     def __init__(self, hosts):
+        here, there = (hosts.keys[name].own() for name in ("here", "there"))
+        super().__init__(there, hosts.ports["there"], here.public, hosts.ports["here"])
         self.hosts = hosts
-        own = hosts.keys["there"].own()
-        self.context = zmq.Context()
-        self.gate = Gatekeeper(self.context, {"here": hosts.keys["here"].own().public})
-        self.offer = self.context.socket(zmq.ROUTER)
-        self.offer.setsockopt(zmq.CURVE_SERVER, 1)
-        self.offer.setsockopt_string(zmq.CURVE_SECRETKEY, own.secret)
-        self.offer.bind(f"tcp://127.0.0.1:{hosts.ports['there']}")
-        self.asks = self.connection()
-
-    def connection(self):
-        """A further connection to the relay here, with the key of there."""
-        own = self.hosts.keys["there"].own()
-        made = self.context.socket(zmq.DEALER)
-        made.setsockopt(zmq.LINGER, 0)
-        made.setsockopt_string(zmq.CURVE_SERVERKEY, self.hosts.keys["here"].own().public)
-        made.setsockopt_string(zmq.CURVE_PUBLICKEY, own.public)
-        made.setsockopt_string(zmq.CURVE_SECRETKEY, own.secret)
-        made.connect(f"tcp://127.0.0.1:{self.hosts.ports['here']}")
-        return made
 
     def give(self, *frames):
         """Sends to the relay here, as its offer there would."""
@@ -443,12 +425,6 @@ class OtherHost:
     def ask(self, *frames):
         """Sends to the relay here, as a request from there would."""
         self.asks.send_multipart(frames)
-
-    def close(self):
-        self.offer.close(linger=0)
-        self.asks.close(linger=0)
-        self.gate.close()
-        self.context.term()
 
 
 @pytest.fixture

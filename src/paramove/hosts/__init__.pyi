@@ -1,3 +1,4 @@
+from . import link as link
 from .keys import HostKeyError as HostKeyError
 from .keys import HostKeys as HostKeys
 from .keys import KeyPair as KeyPair

@@ -82,8 +82,8 @@ class Answered(Message):
 
 
 Asked = Want | Beat | Taken | Answered
-_ASKED: MessageReader[Any] = MessageReader(Want, Beat, Taken, Answered, max_bytes=MAX_ASKED_BYTES)
-_GIVEN: MessageReader[Any] = MessageReader(Beat, Content, max_bytes=MAX_ASKED_BYTES)
+ASKED: MessageReader[Any] = MessageReader(Want, Beat, Taken, Answered, max_bytes=MAX_ASKED_BYTES)
+GIVEN: MessageReader[Any] = MessageReader(Beat, Content, max_bytes=MAX_ASKED_BYTES)
 _FRAMES_BEHIND: dict[type[Message], int] = {Content: 2, Answered: 2}
 
 
@@ -217,7 +217,7 @@ class Offer:
                 continue
             asker.latest_s = time.monotonic()
             try:
-                message, behind = _read(_ASKED, [frame.bytes for frame in frames[1:]])
+                message, behind = _read(ASKED, [frame.bytes for frame in frames[1:]])
                 if isinstance(message, Taken) and message.topic not in asker.wanted:
                     raise MessageError(f"topic {message.topic!r:.60} was not sent there")
             except MessageError as error:
@@ -341,7 +341,7 @@ class Request:
                 return
             frames = self.socket.recv_multipart(zmq.NOBLOCK)
             try:
-                message, behind = _read(_GIVEN, frames)
+                message, behind = _read(GIVEN, frames)
                 if isinstance(message, Beat):
                     self._measure(message)
                     continue

@@ -1,8 +1,11 @@
 from . import application as application
+from . import guard as guard
+from . import messages as messages
 from .agent import Agent as Agent
 from .agent import release_of as release_of
 from .application import check as check
 from .application import check_topics as check_topics
+from .control import ControlServer as ControlServer
 from .control import NoRunError as NoRunError
 from .control import ask as ask
 from .domain import LONGEST_FOLDER as LONGEST_FOLDER
@@ -38,6 +41,7 @@ from .messages import Request as Request
 from .needs import MissingFile as MissingFile
 from .needs import missing_files as missing_files
 from .queued_output import QueuedOutput as QueuedOutput
+from .remote_host import RemoteHost as RemoteHost
 from .remote_host import ask_host as ask_host
 from .run_folder import RunFolder as RunFolder
 from .run_logs import LEVELS as LEVELS

@@ -26,7 +26,7 @@ class Watched(Message):
     watched: bool
 
 
-_READER = MessageReader(Watched, max_bytes=_LONGEST)
+CHANGES = MessageReader(Watched, max_bytes=_LONGEST)
 
 
 def main() -> None:
@@ -36,7 +36,7 @@ def main() -> None:
     groups: set[int] = set()
     while line := sys.stdin.buffer.readline(_LONGEST):
         with contextlib.suppress(MessageError):  # the last one, of a launcher that was killed while it wrote
-            change = _READER.read(line)
+            change = CHANGES.read(line)
             if change.watched:
                 groups.add(change.group)
             else:
