@@ -158,6 +158,11 @@ def test_a_wrong_domain_ends_with_the_code_of_a_wrong_configuration():
     assert answer.stderr.startswith("domain 'Two words': expected up to 40 lower-case letters")
 
 
+def test_no_domain_has_the_folder_in_which_another_hides_its_truth(environment):
+    with pytest.raises(DomainError, match="not beginning with truth-"):
+        environment(PARAMOVE_DOMAIN="truth-default")
+
+
 def test_a_run_folder_that_cannot_be_made_is_told_with_another_place(tmp_path):
     taken = tmp_path / "runs"
     taken.touch()

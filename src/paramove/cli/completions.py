@@ -95,10 +95,11 @@ def topics() -> list[str]:
 def domains() -> list[str]:
     """Domains that are, or were, in use."""
     from paramove.bus import default_folder
+    from paramove.supervision import HIDDEN
 
     with contextlib.suppress(OSError):
         found = [path.name for path in default_folder().parent.iterdir() if path.is_dir()]
-        return [name for name in found if not name.startswith("truth-")]
+        return [name for name in found if not name.startswith(HIDDEN)]
     return []
 
 

@@ -8,6 +8,7 @@ from .application import check_topics as check_topics
 from .control import ControlServer as ControlServer
 from .control import NoRunError as NoRunError
 from .control import ask as ask
+from .domain import HIDDEN as HIDDEN
 from .domain import LONGEST_FOLDER as LONGEST_FOLDER
 from .domain import DomainError as DomainError
 from .domain import DomainNameError as DomainNameError

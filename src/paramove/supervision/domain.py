@@ -17,6 +17,8 @@ from paramove.bus import default_folder, lock_of
 
 LONGEST_FOLDER = 70
 """Bytes of a folder's path; a socket's path may have 107 and the longest topic name needs the rest."""
+HIDDEN = "truth-"
+"""Beginning of the name of the folder in which the truth of a domain lies hidden."""
 
 
 class DomainError(RuntimeError):
@@ -53,9 +55,10 @@ def _made(folder: Path) -> Path:
 
 def check_name(name: str) -> None:
     """Raises DomainNameError if the name is invalid."""
-    if not re.fullmatch(r"[a-z0-9_-]{1,40}", name):
+    if not re.fullmatch(r"[a-z0-9_-]{1,40}", name) or name.startswith(HIDDEN):
         remedy = "unset PARAMOVE_DOMAIN or set it to a name such as 'second'"
-        raise DomainNameError(f"domain {name!r}: expected up to 40 lower-case letters, digits, '_' or '-'; {remedy}")
+        form = f"expected up to 40 lower-case letters, digits, '_' or '-', not beginning with {HIDDEN}"
+        raise DomainNameError(f"domain {name!r}: {form}; {remedy}")
 
 
 @contextlib.contextmanager
@@ -85,7 +88,7 @@ def held_domain(name: str, holder: str) -> Iterator[Domain]:
         lock.truncate(0)
         lock.write(f"pid {os.getpid()} ({holder})")
         lock.flush()
-        hidden = runtime / f"truth-{name}"
+        hidden = runtime / f"{HIDDEN}{name}"
         _remove(folder, hidden)  # of a run that was killed
         try:
             folder.mkdir(mode=0o700)
