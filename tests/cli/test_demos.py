@@ -154,6 +154,17 @@ def test_import_and_label_afterwards(csv, tmp_path):
     assert "its recording, which covers 0 to 1.8 s" in said
 
 
+def test_import_of_a_large_file_names_what_it_does_meanwhile(csv, tmp_path, monkeypatch):
+    monkeypatch.setattr("paramove.cli.demos_import.MANY_BYTES", 1000)
+    done = CliRunner().invoke(
+        build("demos"), ["demos", "import", str(csv), "--to", str(tmp_path / "set"), "--unit", "mm"]
+    )
+    assert done.exit_code == 0, done.output
+    reading, writing = done.stderr.splitlines()[:2]
+    assert reading.startswith(f"reading {csv} (")
+    assert writing.startswith(f"writing {tmp_path / 'set'} (")
+
+
 def test_import_finds_movements(csv, tmp_path):
     good("import", csv, "--to", tmp_path / "set", "--unit", "mm", "--action", "reaching", "--find", "index")
     (found,) = DemonstrationSet.load(tmp_path / "set")

@@ -30,6 +30,8 @@ PointsOption = Annotated[
 MappingOption = Annotated[
     Path | None, typer.Option(metavar="FILE", help="YAML with unit, axes, rate, points; other options come before it")
 ]
+MANY_BYTES = 3_000_000
+"""Are read within about a second, as text."""
 
 
 def import_files(
@@ -85,10 +87,19 @@ def import_files(
         options = replace(
             import_options(mapping, unit, axes, rate, point, zeros_are_places, repeats_are_places), subject=subject
         )
-        results = [import_file(file, options, label, max_gap, name, find) for file in files]
+        results = []
+        for file in files:
+            _announce(f"reading {printable(str(file))}", file.stat().st_size if file.is_file() else 0)
+            results.append(import_file(file, options, label, max_gap, name, find))
         _reject(results, skip_refused)
         names = given if given is not None else results[0].parameter_names or _names_of(values)
         _write(to, results, names, max_gap, repetition, add)
+
+
+def _announce(doing: str, n_bytes: float) -> None:
+    """Names a step that takes more than a moment."""
+    if n_bytes > MANY_BYTES:
+        typer.echo(f"{doing} ({1e-6 * n_bytes:.0f} MB) ...", err=True)
 
 
 def _names_of(values: tuple[float, ...]) -> tuple[str, ...]:
@@ -161,6 +172,7 @@ def _write(
         for take in result.takes:
             labels = take.labels if result.parameter_names else _counted(take.labels, there)
             takes.append(replace(take, labels=labels))
+    _announce(f"writing {to}", sum(take.positions.nbytes for take in takes))
     write_set(to, takes, names, max_gap=max_gap, add=add)
     _print_remarks(results)
     _print_oddities(to)
