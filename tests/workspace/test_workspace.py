@@ -153,6 +153,11 @@ def test_a_variable_names_folders_that_count_whoever_may_write_there(desk, monke
     assert Workspace.at(desk / "mine").layers == (desk, ROOT)
 
 
+def test_a_link_to_nothing_such_as_the_lock_of_an_editor_changes_nothing(desk):
+    (desk / "nodes" / ".#camera.py").symlink_to("somebody@desk.4711")
+    assert Workspace.at(desk).layers == (desk, ROOT)
+
+
 def test_a_link_to_what_others_may_write_is_as_what_it_names(desk, tmp_path_factory):
     other = tmp_path_factory.mktemp("other") / "camera.py"
     other.write_text("SUBSCRIBES = ()")

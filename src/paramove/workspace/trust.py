@@ -32,7 +32,9 @@ def why_distrusted(folder: Path, parts: Iterable[str]) -> str:
         return ""
     try:
         for path in _files_of(folder, parts):
-            if reason := _why_others_may_write(path):
+            is_lost_link = path.is_symlink() and not path.exists()  # such as an editor's lock
+            reason = "" if is_lost_link else _why_others_may_write(path)
+            if reason:
                 return f"{path} {reason}"
         for above in folder.parents:
             if above.stat().st_mode & (stat.S_IWOTH | stat.S_ISVTX) == stat.S_IWOTH:
