@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from paramove.demonstrations.demonstration_set import DemonstrationSet
 from paramove.demonstrations.importing import ImportOptions, import_file
-from paramove.demonstrations.importing.checking import MAX_FRAMES, frozen
+from paramove.demonstrations.importing.checking import MAX_FRAMES, frozen, placeholders
 from paramove.demonstrations.movement import DemonstrationError
 from paramove.demonstrations.writing import Label, write_set
 
@@ -185,6 +185,29 @@ def test_one_point_alone_and_points_that_stop_together_are_not_frozen():
     index[20:30] = index[19]
     assert not frozen(index[:, None]).any()
     assert not frozen(np.stack([index, index + 0.1], axis=1)).any()
+
+
+@pytest.mark.parametrize("position", [(-1.0, -1.0, -1.0), (9999999.0,) * 3, (0.0, 0.0, 30.0)])
+@pytest.mark.parametrize("frames", [[30, 31, 32], [0, 1], [59, 60], [10, 40, 41], list(range(0, 61, 3))], ids=str)
+def test_a_position_that_stands_for_none_is_a_loss(tmp_path, position, frames):
+    index = path()
+    index[frames] = position
+    file = write(tmp_path, {"time": TIME, **points(index=index)})
+    take = import_file(file, ImportOptions("m", "z_up"), REACH, max_gap=1.0).takes[0]
+    assert np.isnan(take.positions[frames]).all()
+    assert np.isfinite(np.delete(take.positions, frames, axis=0)).all()
+
+
+def test_rest_a_second_take_and_one_outlier_are_places():
+    resting = np.round(
+        np.concatenate([np.repeat(path()[:1], 20, axis=0), path(), np.repeat(path()[-1:], 20, axis=0)]), 4
+    )
+    joined = np.concatenate([resting, resting + np.array([2.0, 0.0, 0.0])])
+    outlier = path()
+    outlier[30] += 5.0
+    still = np.repeat(path()[:1], 50, axis=0)
+    for places in (resting, joined, outlier, still, np.concatenate([still, still + 1.0])):
+        assert not placeholders(places).any()
 
 
 def test_frozen_points_are_named_and_may_be_places(tmp_path):

@@ -38,6 +38,10 @@ FILLED_HOLE_S = 2.0
 """No loss that is longer can be interpolated; a longer hole gets a lost frame at both ends only."""
 FROZEN_FRAMES = 3
 """So many equal positions, to the last bit, of a point that moves."""
+FAR = 10.0
+"""How much longer steps to a position that stands for none are than the longest of the point's other steps."""
+MOST_PLACEHOLDERS = 4
+"""Different ones of a point, the most frequent positions."""
 QUANTA = 2.5
 """Steps of so many of the smallest steps in the data are movement, not rounding."""
 JUMP = 1.5
@@ -120,6 +124,14 @@ def checked(
         positions[(positions == 0.0).all(axis=-1)] = np.nan
     positions[~np.isfinite(positions).all(axis=-1)] = np.nan
     if repeats_are_lost:
+        for point, name in enumerate(raw.point_names):
+            marked = placeholders(positions[:, point])
+            positions[marked, point] = np.nan
+            if marked.any():
+                remarks.append(
+                    f"{file}: {name} is at one position far from all others in frames {frame_ranges(marked)}: lost "
+                    "there (--repeats-are-places: it was there)"
+                )
         repeated = frozen(positions)
         positions[repeated] = np.nan
         remarks += [
@@ -307,6 +319,29 @@ def _with_missing_frames(take: RawTake, file: Path | str) -> tuple[RawTake, list
 
 
 # Loss -------------------------------------------------------------------------------------------------------------
+
+
+def placeholders(path: Floats) -> NDArray[np.bool_]:
+    """Where a point has a position that stands for none, such as (-1, -1, -1). Shapes (T, 3) -> (T,).
+
+    That is one position, to the last bit, in several frames, into and out of which every step is `FAR` times as long as
+    the longest of all other steps from frame to frame. A point that rests is reached and left smoothly.
+    """
+    known = np.isfinite(path).all(axis=1)
+    found, which, counts = np.unique(path, axis=0, return_inverse=True, return_counts=True)
+    which = which.reshape(-1)
+    marked: NDArray[np.bool_] = np.zeros(len(path), dtype=np.bool_)
+    steps = np.abs(np.diff(path, axis=0)).max(axis=1, initial=0.0)
+    candidates = [number for number in np.argsort(-counts)[:MOST_PLACEHOLDERS] if counts[number] > 1]
+    for number in candidates:
+        inside = which == number
+        others = known & ~inside & ~marked
+        own = inside[1:] != inside[:-1]
+        into_and_out = steps[own & (others[1:] | others[:-1])]
+        usual = steps[others[1:] & others[:-1]]
+        if np.isfinite(found[number]).all() and len(into_and_out) and usual.max(initial=0.0) > 0.0:
+            marked |= inside & (into_and_out.min() > FAR * usual.max())
+    return marked
 
 
 def frozen(positions: Floats) -> NDArray[np.bool_]:
