@@ -370,11 +370,13 @@ class Proxy:
         self._ways.close()
 
 
-def test_packets_that_are_sent_again_are_worth_nothing(two_hosts):
+def test_packets_that_are_sent_again_are_worth_nothing(two_hosts, request):
     hosts = two_hosts((topics.SPEECH,))
     port = free_ports()
     proxy = Proxy(port, hosts.ports["here"])
     images = Proxy(port + 1, hosts.ports["here"] + 1)
+    for one in (proxy, images):
+        request.addfinalizer(one.close)
     honest = hosts.settings["there"].peers["here"].model_copy(update={"port": port})
     hosts.settings["there"] = hosts.settings["there"].model_copy(update={"peers": {"here": honest}})
     published, subscriber = (
@@ -404,8 +406,6 @@ def test_packets_that_are_sent_again_are_worth_nothing(two_hosts):
     hosts.until(lambda: any(asker.wanted for asker in offer.askers.values()), serve)
     published.publish(Speech(text="again"), 1, 1)
     hosts.until(lambda: received == ["move", "again"], serve)
-    proxy.close()
-    images.close()
 
 
 class OtherHost(RawHost):
