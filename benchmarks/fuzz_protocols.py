@@ -765,7 +765,7 @@ class Crossing(logging.Handler):
         text = f"good {number}"
         payload = Speech(text=text).SerializeToString()
         epoch = 2**31 + number
-        header = pack(Envelope(schema_hash(Speech), 1, epoch, 1, time.monotonic_ns(), time.monotonic_ns()), payload)
+        sequence = 0
         now_ns = time.monotonic_ns()
         self._publisher.publish(Rules(rules=[Rule(object=text)]), now_ns, now_ns)
         want = link.Want(names=[topics.RULES.name]).line()
@@ -776,6 +776,9 @@ class Crossing(logging.Handler):
                 expect(time.monotonic() < end_s, f"a good message does not cross: in {came}, out {gave}")
                 self._drain()
                 asks.send_multipart([want], zmq.NOBLOCK)
+                sequence += 1  # a subscriber that connects late counts the ones before as published
+                envelope = Envelope(schema_hash(Speech), 1, epoch, sequence, time.monotonic_ns(), time.monotonic_ns())
+                header = pack(envelope, payload)
                 for (offer, identity), names in self._ends.items():
                     if topics.SPEECH.name in names:
                         frames = [link.Content(topic=topics.SPEECH.name).line(), header, payload]
