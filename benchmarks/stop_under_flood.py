@@ -244,7 +244,7 @@ def joined(root: Path, hosts: int) -> Iterator[tuple[Path, Path]]:
     keys = {folder: HostKeys(root / f"keys_{folder.name}") for folder in folders}
     rows = {topic.name: topic.name for topic in (topics.ARM_TRAJECTORY, topics.OPERATOR_STOP)}
     make = multiprocessing.get_context("spawn")
-    started = []
+    started, pipes = [], []  # a relay ends with its pipe
     for index, (folder, other) in enumerate((folders, folders[::-1])):
         public = keys[other].own().public
         keys[folder].trust(other.name, public)
@@ -253,6 +253,7 @@ def joined(root: Path, hosts: int) -> Iterator[tuple[Path, Path]]:
         port = FIRST_PORT + 10 * index
         settings = RelaySettings(address="127.0.0.1", port=port, peers={other.name: peer}, keys=keys[folder].folder)
         here, there = make.Pipe()
+        pipes.append(here)
         arguments = (str(folder), folder.name, settings.model_dump(mode="json"), there)
         started.append(make.Process(target=relay, args=arguments, daemon=True))
         started[-1].start()

@@ -36,7 +36,7 @@ def in_own_time(
             is not known to `LARGEST_BOUND_NS`. Never for a request to stop or to disarm, which has no age: its times
             become the time here.
     """
-    message = decoded(topic, payload)
+    message = decoded(topic, payload, topic.has_checked_numbers)
     if topic.is_stop or (topic.type is topics.OPERATOR_ARM.type and not message.armed):
         message.captured.FromNanoseconds(now_ns)
         return envelope._replace(published_ns=now_ns, captured_ns=now_ns), message
@@ -45,7 +45,7 @@ def in_own_time(
     if bound_ns == float("inf") or (moves and bound_ns > LARGEST_BOUND_NS):
         raise UnknownTimeError(f"the clock there is known to {1e-6 * bound_ns:.1f} ms only, so its age is not known")
     impossible = impossible_time(message)
-    if impossible:  # of a request to arm, whose numbers are not checked where it is decoded
+    if impossible:  # where numbers are not checked: of a request to arm, and of a trajectory, which its driver checks
         raise RejectedError(Reason.NUMBER, f"{impossible}, which never was")
     ahead_ns = clock.offset_ns(now_ns)
     _set_back(message, ahead_ns)

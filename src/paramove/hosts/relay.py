@@ -123,6 +123,7 @@ class Relay:
         self._topics: dict[str, Topic] = {}
         self._sources: dict[str, _Source] = {}
         self._publishers: dict[str, Publisher] = {}
+        self._urgent_publishers: list[Publisher] = []
         for host, peer in settings.peers.items():
             rows = {name: topics.by_name(row) for name, row in {**peer.wants, **peer.gives}.items()}
             self._topics |= rows
@@ -148,6 +149,9 @@ class Relay:
         self._latest: dict[tuple[str, str], tuple[int, int]] = {}
         self._link = LinkState(hosts=sorted(host for host, peer in settings.peers.items() if peer.commands))
         self._confirmed_ns = 0
+        for topic in self._topics.values():
+            if topic.name in topics.AWAY:  # before the first request, which has no time to wait for subscribers
+                self._publisher(topics.AWAY[topic.name], topics.AWAY[topic.name].name)
         self._look_due_s = self._detail_due_s = 0.0
         self.detail = ""
         ends: list[Subscriber | Offer | Request | _Answers] = [*self._ends(), *self._offers]
@@ -217,7 +221,6 @@ class Relay:
                 for name, header, payload in request.messages() if request.socket in ready else ():
                     self._publish(request, host, name, header, payload)
                     self._forward_urgent()
-        self._report_link()
         if self._answers is not None and self._settings.clock_from is not None:
             request = self._requests[self._settings.clock_from].topics
             for header, payload in self._answers.collect() if request.is_up else ():
@@ -244,13 +247,17 @@ class Relay:
             offer.forget_silent()
 
     def _forward_urgent(self) -> None:
-        """Both ways, all that there is; called between any two other messages."""
+        """Both ways, all that there is, and the state of the link; called between any two other messages."""
+        for publisher in self._urgent_publishers:
+            publisher.serve()
         for source in self._urgent:
             for envelope, payload in source.messages():
                 self._send_all(source, envelope, payload)
         for host, lanes in self._requests.items():
+            lanes.urgent.ask()
             for name, header, payload in lanes.urgent.messages():
                 self._publish(lanes.urgent, host, name, header, payload)
+        self._report_link()
 
     # -- what others want ---------------------------------------------------------------------------------------------
 
@@ -326,6 +333,8 @@ class Relay:
             self._opened.callback(publisher.close)
             self._foreign.append(publisher.foreign)
             self._publishers[name] = publisher
+            if topic.is_urgent:
+                self._urgent_publishers.append(publisher)
             self._poller.register(publisher.socket, zmq.POLLIN)
         return self._publishers[name]
 
