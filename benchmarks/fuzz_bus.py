@@ -193,8 +193,13 @@ def fuzz(seconds: float, seed: int, write: Callable[[str], object]) -> int:
     return 0
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+def run(about: str | None, fuzz: Callable[[float, int, Callable[[str], object]], int]) -> None:
+    """The command line of a fuzzer: its time and its seed; ends with its exit code.
+
+    Args:
+        about: Docstring of the program. fuzz: Gets both, and what writes a text.
+    """
+    parser = argparse.ArgumentParser(description=(about or "").splitlines()[0])
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
@@ -202,4 +207,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(__doc__, fuzz)

@@ -11,7 +11,6 @@ the files are kept, if anything but a rejection was raised, or 5 s or 1 GB were 
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import multiprocessing
@@ -41,7 +40,7 @@ import psutil
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))  # run as a program, only this folder is known
 
-from benchmarks.fuzz_bus import mutate  # noqa: E402
+from benchmarks.fuzz_bus import mutate, run  # noqa: E402
 from paramove.cameras import FrameError  # noqa: E402
 from paramove.documents import DocumentError, InputError  # noqa: E402
 
@@ -601,13 +600,5 @@ def beside_robots(folder: Path) -> None:
         shutil.copy(path, folder / path.name)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--seed", type=int, default=0)
-    arguments = parser.parse_args()
-    sys.exit(fuzz(arguments.seconds, arguments.seed, sys.stdout.write))
-
-
 if __name__ == "__main__":
-    main()
+    run(__doc__, fuzz)

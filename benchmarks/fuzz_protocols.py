@@ -19,7 +19,6 @@ else happened. The same seed gives the readers the same inputs; the others depen
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import copy
 import json
@@ -46,7 +45,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))  # run as a program, only this folder is known
 
 from benchmarks.fuzz_bus import example as bus_message  # noqa: E402
-from benchmarks.fuzz_bus import memory_mib, mutate  # noqa: E402
+from benchmarks.fuzz_bus import memory_mib, mutate, run  # noqa: E402
 from benchmarks.fuzz_files import peak_mib  # noqa: E402
 from benchmarks.hosts import hosts  # noqa: E402
 from paramove.bus import Bus, BusSettings, BusVisitor, Envelope, pack, schema_hash, topics  # noqa: E402
@@ -840,13 +839,5 @@ def fuzz(seconds: float, seed: int, write: Callable[[str], object]) -> int:
     return 0
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--seed", type=int, default=0)
-    arguments = parser.parse_args()
-    sys.exit(fuzz(arguments.seconds, arguments.seed, sys.stdout.write))
-
-
 if __name__ == "__main__":
-    main()
+    run(__doc__, fuzz)

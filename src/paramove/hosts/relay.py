@@ -149,9 +149,9 @@ class Relay:
         self._latest: dict[tuple[str, str], tuple[int, int]] = {}
         self._link = LinkState(hosts=sorted(host for host, peer in settings.peers.items() if peer.commands))
         self._confirmed_ns = 0
-        for topic in self._topics.values():
-            if topic.name in topics.AWAY:  # before the first request, which has no time to wait for subscribers
-                self._publisher(topics.AWAY[topic.name], topics.AWAY[topic.name].name)
+        for row in {row for peer in settings.peers.values() for row in peer.gives.values()} & topics.AWAY.keys():
+            away_topic = topics.AWAY[row]  # before the first request, which has no time to wait for subscribers
+            self._publisher(away_topic, away_topic.name)
         self._look_due_s = self._detail_due_s = 0.0
         self.detail = ""
         ends: list[Subscriber | Offer | Request | _Answers] = [*self._ends(), *self._offers]

@@ -82,19 +82,17 @@ class Workspace:
         """Every file of the workspace by its relative path, each in the first layer that has it."""
         files: dict[str, Path] = {}
         for layer in reversed(self.layers):
-            for part in PARTS:
-                for file in sorted((layer / part).rglob("*")):
-                    if file.is_file() and file.suffix != ".pyc":
-                        files[file.relative_to(layer).as_posix()] = file
+            files |= _files_of(layer)
         return dict(sorted(files.items()))
 
     def replaced(self) -> list[str]:
         """Files of nodes, launch files and simulation, and folders of robots, that replace installed ones."""
         names = set()
-        for name, file in self.files().items():
-            if not file.is_relative_to(self.layers[-1]) and (self.layers[-1] / name).is_file():
-                parts = Path(name).parts
-                names.add("/".join(parts[:2]) if parts[0] == "robot_description" else name)
+        for layer in self.layers[:-1]:
+            for name in _files_of(layer):
+                if (self.layers[-1] / name).is_file():
+                    parts = Path(name).parts
+                    names.add("/".join(parts[:2]) if parts[0] == "robot_description" else name)
         return sorted(names)
 
     @cached_property
@@ -112,6 +110,12 @@ class Workspace:
 
 def _is_whole(folder: Path) -> bool:
     return (folder / "launch").is_dir() and (folder / "nodes").is_dir()
+
+
+def _files_of(layer: Path) -> dict[str, Path]:
+    """Every file of one layer by its relative path."""
+    files = (file for part in PARTS for file in sorted((layer / part).rglob("*")))
+    return {file.relative_to(layer).as_posix(): file for file in files if file.is_file() and file.suffix != ".pyc"}
 
 
 def _installed() -> tuple[Path, ...]:

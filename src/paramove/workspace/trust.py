@@ -6,6 +6,7 @@ which would run with this user's rights. Permissions of the file system decide; 
 
 from __future__ import annotations
 
+import functools
 import grp
 import os
 import pwd
@@ -77,6 +78,7 @@ def _name_of(user: int) -> str:
         return f"user {user}"
 
 
+@functools.cache  # all files of a workspace have one, and the list of users may come over the network
 def _members(group: int) -> set[str]:
     """Names of the users in a group; a group of one user alone is usual, and so is one that nobody has named."""
     try:

@@ -41,7 +41,7 @@ FROZEN_FRAMES = 3
 FAR = 10.0
 """How much longer steps to a position that stands for none are than the longest of the point's other steps."""
 MOST_PLACEHOLDERS = 4
-"""Different ones of a point, the most frequent positions."""
+"""Different ones of a point."""
 QUANTA = 2.5
 """Steps of so many of the smallest steps in the data are movement, not rounding."""
 JUMP = 1.5
@@ -327,21 +327,27 @@ def placeholders(path: Floats) -> NDArray[np.bool_]:
     That is one position, to the last bit, in several frames, into and out of which every step is `FAR` times as long as
     the longest of all other steps from frame to frame. A point that rests is reached and left smoothly.
     """
-    known = np.isfinite(path).all(axis=1)
-    found, which, counts = np.unique(path, axis=0, return_inverse=True, return_counts=True)
-    which = which.reshape(-1)
     marked: NDArray[np.bool_] = np.zeros(len(path), dtype=np.bool_)
-    steps = np.abs(np.diff(path, axis=0)).max(axis=1, initial=0.0)
-    candidates = [number for number in np.argsort(-counts)[:MOST_PLACEHOLDERS] if counts[number] > 1]
-    for number in candidates:
-        inside = which == number
-        others = known & ~inside & ~marked
-        own = inside[1:] != inside[:-1]
-        into_and_out = steps[own & (others[1:] | others[:-1])]
-        usual = steps[others[1:] & others[:-1]]
-        if np.isfinite(found[number]).all() and len(into_and_out) and usual.max(initial=0.0) > 0.0:
-            marked |= inside & (into_and_out.min() > FAR * usual.max())
+    if len(path) < 2:
+        return marked
+    known = np.isfinite(path).all(axis=1)
+    steps = np.abs(np.diff(path, axis=0)).max(axis=1)
+    for _ in range(MOST_PLACEHOLDERS):
+        places = known & ~marked
+        longest = int(np.argmax(np.where(places[1:] & places[:-1], steps, 0.0)))
+        ends = [(path == path[frame]).all(axis=1) for frame in (longest, longest + 1)]
+        far = [inside for inside in ends if inside.sum() > 1 and _is_far(inside, places & ~inside, steps)]
+        if not far:
+            break
+        marked |= far[0]
     return marked
+
+
+def _is_far(inside: NDArray[np.bool_], others: NDArray[np.bool_], steps: Floats) -> bool:
+    """Whether all steps between frames at one position and others are far longer than those between the others."""
+    crossing = (inside[1:] & others[:-1]) | (others[1:] & inside[:-1])
+    usual = float(steps[others[1:] & others[:-1]].max(initial=0.0))
+    return bool(crossing.any() and usual > 0.0 and steps[crossing].min() > FAR * usual)
 
 
 def frozen(positions: Floats) -> NDArray[np.bool_]:

@@ -77,7 +77,7 @@ def _usb_port(link: Path) -> str:
     """Name of the USB port; "" where udev has made no link of it. Of two names it is the first in their order."""
     device = link.resolve()
     names = sorted(other.name for other in adapter_links(by_path(link.parent)) if other.resolve() == device)
-    return INTERFACE.sub("", re.sub(r"-port\d+$", "", names[0])) if names else ""
+    return re.sub(r"-port\d+$", "", names[0]) if names else ""
 
 
 def by_path(by_id: Path) -> Path:
