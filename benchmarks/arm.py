@@ -77,6 +77,11 @@ class Emulation:
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.does("ready")
 
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        return self._process.pid
+
     def does(self, command: str) -> None:
         """Sends a command and waits until it is done."""
         assert self._process.stdin is not None

@@ -1,16 +1,18 @@
 """How long a person's stop takes while trajectories flood the driver of an arm that moves.
 
     python benchmarks/stop_under_flood.py [--stops 100] [--robots hoap3,open_manipulator_x] [--kinds valid,large]
-                                          [--hosts 1,2] [--busy 2] [--json FILE]
+                                          [--hosts 1,2] [--namespaces] [--busy 2] [--json FILE]
 
-Each stop is with new processes: the real driver node, emulated servos or a robot that only plays its stream, and a
-program that commands a movement and then publishes trajectories as fast as it can. At some time of the movement a stop
-is published once. Measured by the wall clock until the gate's answer arrives, which the driver publishes after the
-first rows of the stop; a servo arm plays the first of them within one more period, which is added. With two hosts
-program and person are on another bus, and two relays over the loopback are between them and the driver.
+In each scene there are the real driver node, emulated servos or a robot that only plays its stream, and a program that
+commands a movement and then publishes trajectories as fast as it can. At some time of the movement a stop is published
+once. Measured by the wall clock from when it is published to the driver until the driver publishes the gate's answer,
+after the first rows of the stop; a servo arm plays the first of them within one more period, which is added. A driver
+that has been flooded keeps its publisher out for a while, so some scenes take turns, each with the next part of the
+movement. With two hosts program and person are on another bus, and two relays are between them and the driver: over the
+loopback, or each in a network namespace, which needs root. There the last column begins with the person.
 
-    valid     short movements       invalid   1 MB each, 47 000 points, the last one NaN
-    large     1 MB each, valid      many      two points each
+    valid     short movements       invalid   1 MB each, of tens of thousands of points, the last one NaN
+    large     20 000 points each    many      two points each
     checked   the arm is at rest, and each movement of 120 s breaks a limit in its last part only
 
 Beside it, a timer of 10 ms shows how late this machine is by itself. A stop during which that timer stalled for more
@@ -21,15 +23,20 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import ctypes
 import json
 import math
 import multiprocessing
+import os
 import select
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +48,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # run as a prog
 
 from benchmarks.arm import Emulation
 from benchmarks.hosts import relay
+from benchmarks.namespaces import HERE, THERE, Namespaces
 from paramove.bus import BusVisitor, Publisher, publish_now, topics
 from paramove.hosts import HostKeys, Peer, RelaySettings
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
@@ -58,25 +66,39 @@ OTHER_SWING = {0: 40.0}
 SWING_S = 4.0
 LEAD_S = 0.4
 """From the begin of the movement to that of the flood."""
+AFTER_S = (0.05, 0.8)
+"""From the begin of the flood to the stop: about until its publisher is kept out."""
 TIMER_S, STALL_S = 0.010, 0.020
 TIMEOUT_S = 60.0
 START_TIMEOUT_S = 60.0
 STATE_S = 1 / 15
 FIRST_PORT = 47_300
+SCENES, TURN_S = 6, 10.5
+"""A scene's next turn comes later than a flood's publisher is kept out."""
+SERVOS_PRIORITY = -15
+CONNECTS_S = 0.5
+"""Until relays that were paused are connected again."""
+TIMES = ("p50_ms", "p99_ms", "max_ms", "person_max_ms")
+NETWORK_NAMESPACE = 0x40000000  # CLONE_NEWNET of sched.h
 TIMEOUTS = {"silent_s": 0.5, "watchdog_s": 2.54, "read_s": 0.2}
 """Of servos that share the processors with everything else."""
 
 
 def movement(
-    robot: RobotDescription, name: str, n_points: int, duration_s: float, part: float = 1.0
+    robot: RobotDescription, name: str, n_points: int, duration_s: float, pose: dict[str, float] | None = None
 ) -> JointTrajectory:
-    """From the base pose along a minimum-jerk path by that part of the swing."""
+    """Along a minimum-jerk path from a pose, rad by joint, to that end of the swing that is farther away.
+
+    Without a pose from the base pose.
+    """
     goals_deg = SWING.get(robot.name, {robot.joint_names[joint]: value for joint, value in OTHER_SWING.items()})
     message = JointTrajectory(id=name, joints=list(goals_deg))
-    start = robot.base_pose[robot.indices(message.joints)]
-    goal = np.deg2rad(list(goals_deg.values()))
+    base = robot.base_pose[robot.indices(message.joints)]
+    ends = base, base + np.deg2rad(list(goals_deg.values()))
+    start = np.array([pose[joint] for joint in message.joints]) if pose else base
+    goal = max(ends, key=lambda end: float(np.abs(end - start).max()))
     for u in np.linspace(0.0, 1.0, n_points):
-        message.points.add(time_s=duration_s * u, position_rad=start + part * minimum_jerk(u) * goal)
+        message.points.add(time_s=duration_s * u, position_rad=start + minimum_jerk(u) * (goal - start))
     return message
 
 
@@ -87,7 +109,7 @@ def flooding(robot: RobotDescription, kind: str) -> JointTrajectory:
     if kind == "valid":
         return movement(robot, kind, 301, SWING_S)
     if kind == "large":
-        return movement(robot, kind, 20_001, 100.0)
+        return movement(robot, kind, 20_000, 100.0)
     if kind == "invalid":
         message = movement(robot, kind, 2, 1.0)
         message.points.extend([message.points[0]] * ((2**20 - 100) // (message.points[0].ByteSize() + 2) - 2))
@@ -99,26 +121,36 @@ def flooding(robot: RobotDescription, kind: str) -> JointTrajectory:
 
 
 def flood(folder: str, name: str, kind: str) -> None:
-    """A program of its own: waits for a line, commands a movement, and floods until it is killed."""
+    """A program of its own: for each pose that it reads it commands a movement and floods until the next line."""
     robot = RobotDescription.load(ROOT / "robot_description" / name)
     message = flooding(robot, kind)
+    number = 0
     with BusVisitor(Path(folder), "flooder") as visitor:
-        publisher = visitor.publisher(topics.ARM_TRAJECTORY)
+        publisher = visitor.publisher(replace(topics.ARM_TRAJECTORY, max_points=None))  # it keeps to no limit
         while not publisher.subscriptions:
             publisher.serve()
             time.sleep(0.01)
         print_line("ready")
-        sys.stdin.readline()
-        number, begun_s = 0, time.monotonic()
-        if kind != "checked":
-            publish(publisher, movement(robot, "swing", 401, SWING_S))
-            while time.monotonic() - begun_s < LEAD_S:
-                publisher.serve()
-                time.sleep(0.01)
         while True:
-            number += 1
-            message.id = f"{kind} {number}"
-            publish(publisher, message)
+            pose = json.loads(waits_for_line(publisher))
+            begun_s = time.monotonic()
+            if kind != "checked":
+                publish(publisher, movement(robot, f"swing {number}", 401, SWING_S, pose))
+                while time.monotonic() - begun_s < LEAD_S:
+                    publisher.serve()
+                    time.sleep(0.01)
+            while not select.select([sys.stdin], [], [], 0.0)[0]:
+                number += 1
+                message.id = f"{kind} {number}"
+                publish(publisher, message)
+            sys.stdin.readline()
+
+
+def waits_for_line(publisher: Publisher) -> str:
+    """Of standard input, while the publisher is served; ends the program with its input."""
+    while not select.select([sys.stdin], [], [], 0.01)[0]:
+        publisher.serve()
+    return sys.stdin.readline() or sys.exit()
 
 
 def publish(publisher: Publisher, message: Any) -> None:
@@ -162,12 +194,25 @@ def timer(pipe: Any) -> None:
             found = []
 
 
+@dataclass(frozen=True)
+class Stop:
+    """When the person published it, when it was published to the driver, and when its first row is played, s."""
+
+    begun_s: float
+    received_s: float
+    played_s: float
+
+
 class World:
     """The robot and the person, on the buses of the person's host and of the driver's, which may be the same."""
 
     def __init__(self, robot: RobotDescription, person: BusVisitor, driver: BusVisitor) -> None:
-        self.safety = SafetyState()
-        self._gate = driver.subscriber(topics.ARM_SAFETY)
+        self.robot, self.safety, self.answered_s = robot, SafetyState(), 0.0
+        self.pose: dict[str, float] = {}
+        """Of the arm, rad by joint."""
+        self._gate, self._joints = driver.subscriber(topics.ARM_SAFETY), driver.subscriber(topics.ARM_JOINT_STATES)
+        self.is_relayed = driver is not person
+        self._relayed, self._relayed_s = driver.subscriber(topics.OPERATOR_STOP_AWAY), 0.0
         self._arming, self._stop = driver.publisher(topics.OPERATOR_ARM), person.publisher(topics.OPERATOR_STOP)
         self._reader: StreamReader | None = None
         if robot.bus is None:  # HOAP-3: this plays its stream
@@ -197,8 +242,13 @@ class World:
             publisher.serve()
         if self._gate.socket.poll(2):
             while (received := self._gate.receive()) is not None:
-                self.safety = received.message
-        self._gate.revive()
+                self.safety, self.answered_s = received.message, 1e-9 * received.published_ns
+        while (received := self._joints.receive()) is not None:
+            self.pose = {joint.name: joint.position for joint in received.message.joints}
+        while (received := self._relayed.receive()) is not None:
+            self._relayed_s = 1e-9 * received.published_ns
+        for subscriber in (self._gate, self._joints, self._relayed):
+            subscriber.revive()
         if self._reader is not None:
             self._play(self._reader)
 
@@ -215,32 +265,60 @@ class World:
             publish(self._state, state_message(reader.state(reader.target, time.monotonic_ns())))
 
     def arms(self) -> None:
-        """As a person does; again if the machine was too busy."""
-        assert self.until(lambda gate: gate.state == SafetyState.STATE_DISARMED, START_TIMEOUT_S), "no driver"
-        for _ in range(10):
+        """As a person does, once the arm rests; again if the machine was too busy."""
+        resting = (SafetyState.STATE_DISARMED, SafetyState.STATE_HOLD)
+        self.safety = SafetyState()  # as it was before a pause
+        assert self.until(lambda gate: gate.state in resting and self.pose, START_TIMEOUT_S), "no driver"
+        for _ in range(50):
             publish_now(self._arming, ArmRequest(source="benchmark", armed=True, by_person=True))
-            if self.until(lambda gate: gate.state == SafetyState.STATE_ARMED, 5.0):
+            if self.until(lambda gate: gate.state == SafetyState.STATE_ARMED, 1.0):
                 return
         raise SystemExit(f"the arm cannot be armed: {self.safety}")
 
-    def stop_s(self) -> tuple[float, float]:
-        """When the stop was published, s, and until the gate's answer, s; infinite without one."""
+    def disarms(self) -> None:
+        """Once the arm rests."""
+        resting = (SafetyState.STATE_DISARMED, SafetyState.STATE_HOLD)
+        assert self.until(lambda gate: gate.state in resting, TIMEOUT_S), f"no rest: {self.safety}"
+        publish_now(self._arming, ArmRequest(source="benchmark", by_person=True))
+        assert self.until(lambda gate: gate.state == SafetyState.STATE_DISARMED, TIMEOUT_S), f"no end: {self.safety}"
+
+    def stop(self) -> Stop:
+        """Published once; never played without an answer of the driver."""
         assert self.until(lambda gate: self._stop.subscriptions > 0, START_TIMEOUT_S), "nobody subscribes to stops"
         begun_s = time.monotonic()
         publish_now(self._stop, StopRequest(source="benchmark"))
         answered = self.until(lambda gate: any(fault.code == PERSON_STOP for fault in gate.faults), TIMEOUT_S)
-        return begun_s, time.monotonic() - begun_s if answered else math.inf
+        if not answered:
+            print_line(f"no answer: {self.safety}")
+        period_s = 0.0 if self.robot.bus is None else 1e-6 * self.robot.stream.period_us
+        self.step()
+        received_s = max(begun_s, self._relayed_s)
+        return Stop(begun_s, received_s, self.answered_s + period_s if answered else math.inf)
+
+
+def relay_within(namespace: str, folder: str, name: str, settings: dict[str, Any], pipe: Connection) -> None:
+    """A host's relay, in a network namespace if it has a name."""
+    if namespace:
+        descriptor = os.open(f"/var/run/netns/{namespace}", os.O_RDONLY)
+        if ctypes.CDLL(None, use_errno=True).setns(descriptor, NETWORK_NAMESPACE):
+            raise OSError(ctypes.get_errno(), "cannot enter the network namespace", namespace)
+    relay(folder, name, settings, pipe)
 
 
 @contextlib.contextmanager
-def joined(root: Path, hosts: int) -> Iterator[tuple[Path, Path]]:
-    """Bus folders of the person and of the driver: one, or two that are joined by relays."""
+def joined(
+    root: Path, hosts: int, first_port: int, namespaces: Namespaces | None
+) -> Iterator[tuple[Path, Path, list[int]]]:
+    """Bus folders of the person and of the driver: one, or two that are joined by relays, and these processes."""
     folders = [root / name for name in ("desk", "robot")][2 - hosts :]
     for folder in folders:
         folder.mkdir(mode=0o700)
     if hosts == 1:
-        yield folders[0], folders[0]
+        yield folders[0], folders[0], []
         return
+    within = namespaces.names if namespaces else ["", ""]
+    addresses = [HERE, THERE] if namespaces else ["127.0.0.1"] * 2
+    ports = [first_port, first_port + 10]
     keys = {folder: HostKeys(root / f"keys_{folder.name}") for folder in folders}
     rows = {topic.name: topic.name for topic in (topics.ARM_TRAJECTORY, topics.OPERATOR_STOP)}
     make = multiprocessing.get_context("spawn")
@@ -249,17 +327,18 @@ def joined(root: Path, hosts: int) -> Iterator[tuple[Path, Path]]:
         public = keys[other].own().public
         keys[folder].trust(other.name, public)
         wants, gives = ({}, rows) if folder.name == "robot" else (rows, {})
-        peer = Peer(address="127.0.0.1", port=FIRST_PORT + 10 * (1 - index), key=public, wants=wants, gives=gives)
-        port = FIRST_PORT + 10 * index
-        settings = RelaySettings(address="127.0.0.1", port=port, peers={other.name: peer}, keys=keys[folder].folder)
+        peer = Peer(address=addresses[1 - index], port=ports[1 - index], key=public, wants=wants, gives=gives)
+        settings = RelaySettings(
+            address=addresses[index], port=ports[index], peers={other.name: peer}, keys=keys[folder].folder
+        )
         here, there = make.Pipe()
         pipes.append(here)
-        arguments = (str(folder), folder.name, settings.model_dump(mode="json"), there)
-        started.append(make.Process(target=relay, args=arguments, daemon=True))
+        arguments = (within[index], str(folder), folder.name, settings.model_dump(mode="json"), there)
+        started.append(make.Process(target=relay_within, args=arguments, daemon=True))
         started[-1].start()
         assert here.recv() == "ready"
     try:
-        yield folders[0], folders[1]
+        yield folders[0], folders[1], [process.pid for process in started if process.pid]
     finally:
         for process in started:
             process.terminate()
@@ -278,53 +357,97 @@ def program(*command: str, cwd: Path = ROOT) -> Iterator[subprocess.Popen[str]]:
             process.kill()
 
 
-def measure(name: str, kind: str, hosts: int, after_s: float) -> tuple[float, float]:
-    """One stop with new processes, so long after the flood has begun: when, s, and how long it took, s."""
+class Scene:
+    """Driver, robot, flooder and person, ready to be stopped."""
+
+    def __init__(self, world: World, flooder: subprocess.Popen[str], paused: list[int]) -> None:
+        self._world, self._flooder, self._paused = world, flooder, paused
+        self._flooded_s = -math.inf
+        assert flooder.stdout is not None
+        while not select.select([flooder.stdout], [], [], 0.0)[0]:
+            world.step()
+        assert flooder.stdout.readline() == "ready\n"
+        self._pause()
+
+    def stopped(self, after_s: float) -> Stop:
+        """A stop so long after the flood has begun."""
+        time.sleep(max(0.0, self._flooded_s + TURN_S - time.monotonic()))
+        self._signal(signal.SIGCONT)
+        self._world.goes_on(CONNECTS_S if self._world.is_relayed else 0.0)
+        self._world.arms()
+        self._says(json.dumps(self._world.pose))
+        self._world.goes_on(LEAD_S + after_s)
+        stop = self._world.stop()
+        self._says("rest")
+        self._flooded_s = time.monotonic()
+        self._pause()
+        return stop
+
+    def __enter__(self) -> Scene:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._signal(signal.SIGCONT)
+
+    def _pause(self) -> None:
+        """Until its next turn it takes no time from others."""
+        self._world.disarms()
+        self._signal(signal.SIGSTOP)
+
+    def _signal(self, which: signal.Signals) -> None:
+        for process in self._paused:
+            os.kill(process, which)
+
+    def _says(self, line: str) -> None:
+        assert self._flooder.stdin is not None
+        self._flooder.stdin.write(line + "\n")
+        self._flooder.stdin.flush()
+
+
+@contextlib.contextmanager
+def scene(name: str, kind: str, hosts: int, number: int = 0, namespaces: Namespaces | None = None) -> Iterator[Scene]:
+    """With new processes; scenes that are there at the same time have numbers of their own."""
     folder = ROOT / "robot_description" / name
     robot = RobotDescription.load(folder)
     with tempfile.TemporaryDirectory(prefix="pm-") as root, contextlib.ExitStack() as opened:
-        desk, driver = opened.enter_context(joined(Path(root), hosts))
+        desk, driver, paused = opened.enter_context(joined(Path(root), hosts, FIRST_PORT + 20 * number, namespaces))
         parameters: dict[str, Any] = {"robot": str(folder)}
         if robot.bus is not None:
             link = Path(root) / "usb-emulated_0001-if00-port0"
-            opened.callback(Emulation(folder, robot.bus.baud_rate, link).end)
+            emulation = Emulation(folder, robot.bus.baud_rate, link)
+            opened.callback(emulation.end)
+            paused.append(emulation.pid)
+            with contextlib.suppress(PermissionError):  # real servos have processors of their own
+                os.setpriority(os.PRIO_PROCESS, emulation.pid, SERVOS_PRIORITY)
             parameters |= {"port": str(link), "timeouts": TIMEOUTS}
         node = "arm_driver" if robot.bus is None else "servo_arm_driver"
         config = Path(root) / "driver.yaml"
         bus = {"folder": str(driver), "clock": "monotonic"}
         config.write_text(json.dumps({"node": "driver", "bus": bus, "parameters": parameters, "run_folder": root}))
-        opened.enter_context(program(sys.executable, "-m", f"nodes.{node}", "--config", str(config)))
+        paused.append(opened.enter_context(program(sys.executable, "-m", f"nodes.{node}", "--config", str(config))).pid)
         flooder = opened.enter_context(program(sys.executable, __file__, "--flood", str(desk), name, kind))
-        person, beside = (
-            opened.enter_context(BusVisitor(desk, "person")),
-            opened.enter_context(BusVisitor(driver, "world")),
-        )
-        world = World(robot, person, beside)
-        assert flooder.stdin is not None
-        assert flooder.stdout is not None
-        while not select.select([flooder.stdout], [], [], 0.0)[0]:
-            world.step()
-        assert flooder.stdout.readline() == "ready\n"
-        world.arms()
-        flooder.stdin.write("go\n")
-        flooder.stdin.flush()
-        world.goes_on(LEAD_S + after_s)
-        begun_s, stop_s = world.stop_s()
-        return begun_s, stop_s + (0.0 if robot.bus is None else 1e-6 * robot.stream.period_us)
+        beside = opened.enter_context(BusVisitor(driver, "world"))
+        person = beside if hosts == 1 else opened.enter_context(BusVisitor(desk, "person"))
+        with Scene(World(robot, person, beside), flooder, paused) as ready:
+            yield ready
 
 
-def rows_of(results: dict[tuple[str, str, int], list[tuple[float, float]]]) -> list[dict[str, Any]]:
+def rows_of(results: dict[tuple[str, str, int], list[tuple[Stop, float]]]) -> list[dict[str, Any]]:
     """Of each case, its stops that count, and those that a stall of the machine fell into."""
     rows = []
     for (name, kind, hosts), stops in results.items():
-        counted = 1e3 * np.array([stop_s for stop_s, stall_s in stops if stall_s <= STALL_S])
+        counted = [stop for stop, stall_s in stops if stall_s <= STALL_S]
         row: dict[str, Any] = {"robot": name, "kind": kind, "hosts": hosts, "stops": len(counted)}
         row["left_out"] = [
-            [round(1e3 * stop_s, 1), round(1e3 * stall, 1)] for stop_s, stall in stops if stall > STALL_S
+            [round(1e3 * (stop.played_s - stop.received_s), 1), round(1e3 * stall, 1)]
+            for stop, stall in stops
+            if stall > STALL_S
         ]
-        if len(counted):
-            quantiles = np.quantile(counted, [0.5, 0.99], method="higher")
-            row |= dict(zip(("p50_ms", "p99_ms", "max_ms"), [*quantiles.tolist(), counted.max()], strict=True))
+        if counted:
+            times_ms = 1e3 * np.array([stop.played_s - stop.received_s for stop in counted])
+            quantiles = np.quantile(times_ms, [0.5, 0.99], method="higher")
+            row |= dict(zip(("p50_ms", "p99_ms", "max_ms"), [*quantiles.tolist(), times_ms.max()], strict=True))
+            row["person_max_ms"] = 1e3 * max(stop.played_s - stop.begun_s for stop in counted)
         rows.append(row)
     return rows
 
@@ -337,9 +460,19 @@ def print_line(text: str) -> None:
 
 def print_table(rows: list[dict[str, Any]], late_ms: list[float]) -> None:
     """The table, and the timer beside it."""
-    table = Table("robot", "flood", "hosts", "stops", "p50, ms", "p99, ms", "max, ms", "left out: stop / stall, ms")
+    table = Table(
+        "robot",
+        "flood",
+        "hosts",
+        "stops",
+        "p50, ms",
+        "p99, ms",
+        "max, ms",
+        "from the person: max, ms",
+        "left out: stop / stall, ms",
+    )
     for row in rows:
-        times = [f"{row[key]:.1f}" if key in row else "–" for key in ("p50_ms", "p99_ms", "max_ms")]
+        times = [f"{row[key]:.1f}" if key in row else "–" for key in TIMES]
         left_out = ", ".join(f"{stop:.0f} / {stall:.0f}" for stop, stall in row["left_out"]) or "–"
         table.add_row(row["robot"], row["kind"], str(row["hosts"]), str(row["stops"]), *times, left_out)
     Console().print(table)
@@ -354,6 +487,9 @@ def main() -> None:
     parser.add_argument("--robots", default="hoap3,open_manipulator_x")
     parser.add_argument("--kinds", default=",".join(KINDS))
     parser.add_argument("--hosts", default="1,2")
+    parser.add_argument(
+        "--namespaces", action="store_true", help="each of two hosts is a network namespace; needs root"
+    )
     parser.add_argument("--busy", type=int, default=0, help="programs that never rest")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--flood", nargs=3, help=argparse.SUPPRESS)
@@ -366,22 +502,30 @@ def main() -> None:
         for name in options.robots.split(",")
         for kind in options.kinds.split(",")
     ]
-    results: dict[tuple[str, str, int], list[tuple[float, float]]] = {case: [] for case in cases}
+    results: dict[tuple[str, str, int], list[tuple[Stop, float]]] = {case: [] for case in cases}
     late_ms: list[float] = []
     draw = np.random.default_rng(0)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as opened:
-        for _ in range(options.busy):
-            opened.enter_context(program(sys.executable, "-c", "while True: pass"))
+        namespaces = opened.enter_context(Namespaces()) if options.namespaces else None
         beside = opened.enter_context(Timer())
         for case in cases:
-            for number in range(options.stops):
-                begun_s, stop_s = measure(*case, after_s=float(draw.uniform(0.05, 1.5)))
-                samples = beside.taken()
-                late_ms += [1e3 * late_s for _, late_s in samples]
-                until_s = begun_s + stop_s
-                during = [late for due_s, late in samples if due_s + late > begun_s and due_s < until_s]
-                results[case].append((stop_s, max(during, default=0.0)))
-                print_line(f"{' '.join(map(str, case))}: {number + 1} of {options.stops}, {1e3 * stop_s:.1f} ms")
+            with contextlib.ExitStack() as opened_here:
+                scenes = [
+                    opened_here.enter_context(scene(*case, number, namespaces))
+                    for number in range(min(SCENES, options.stops))
+                ]
+                for _ in range(options.busy):
+                    opened_here.enter_context(program(sys.executable, "-c", "while True: pass"))
+                for number in range(options.stops):
+                    stop = scenes[number % SCENES].stopped(float(draw.uniform(*AFTER_S)))
+                    samples = beside.taken()
+                    late_ms += [1e3 * late_s for _, late_s in samples]
+                    during = [
+                        late_s for due_s, late_s in samples if due_s + late_s > stop.begun_s and due_s < stop.played_s
+                    ]
+                    results[case].append((stop, max(during, default=0.0)))
+                    took_ms = 1e3 * (stop.played_s - stop.received_s)
+                    print_line(f"{' '.join(map(str, case))}: {number + 1} of {options.stops}, {took_ms:.1f} ms")
     rows = rows_of({case: stops for case, stops in results.items() if stops})
     print_table(rows, late_ms)
     if options.json:

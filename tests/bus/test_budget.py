@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paramove.bus.budget import ALLOWANCE, BURST, RateBudget
+from paramove.bus.budget import ALLOWANCE, BURST, COUNTED_BYTES, FloodGuard, RateBudget
 
 SECOND_NS = 10**9
 
@@ -42,3 +42,9 @@ def test_a_new_epoch_begins_anew_and_time_that_runs_back_gives_nothing() -> None
 def test_no_rate_no_limit() -> None:
     budget = RateBudget(None)
     assert all(budget.admits(1, 0) for _ in range(10_000))
+
+
+def test_a_large_message_counts_as_many_of_the_counted_size() -> None:
+    guard = FloodGuard(1)
+    assert [guard.admits(16 * COUNTED_BYTES) for _ in range(2)] == [True, False]
+    assert [guard.admits(100) for _ in range(5)] == [True] * 4 + [False]

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from paramove.bus import topics
 from paramove.bus.budget import ALLOWANCE, BURST
 from paramove.bus.bus import Bus
 from paramove.bus.envelope import Reason
+from paramove.bus.monitor import can_read
 from paramove.bus.publisher import Publisher
 from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Subscriber
@@ -167,6 +169,31 @@ def test_a_publisher_of_commands_that_floods_is_cut_off_and_named_and_may_come_b
         wait(lambda: (found := status.receive()) and "(wild)" in found.message.detail, lambda: bus.exchange.wait(0.01))
         wait(lambda: not subscriber.cut_off, lambda: bus.exchange.wait(0.01))
         wait(lambda: subscriber.counter.lost >= 100, publisher.serve, lambda: bus.exchange.wait(0.01))
+
+
+def test_of_large_commands_few_are_decoded_and_one_is_read_in_a_call(
+    context: Context, folder: Path, wait: Wait
+) -> None:
+    """Twenty of 1 MB: to read and decode them all would keep a stop waiting."""
+    publisher = Publisher(context, folder, topics.ARM_TRAJECTORY, "wild")
+    subscriber = Subscriber(context, folder, topics.ARM_TRAJECTORY, by_own_clock=True)
+    wait(lambda: publisher.subscriptions, publisher.serve, subscriber.receive)
+    large = JointTrajectory(id="large", joints=["x" * (2**20 - 1000)])
+    begun_s = time.monotonic()
+    for _ in range(20):
+        publisher.publish(large, SECOND_NS, SECOND_NS)
+
+    def read() -> int:
+        return subscriber.counter.messages + subscriber.counter.rejected.total()
+
+    while read() < 20:
+        before = read()
+        wait(lambda: can_read(subscriber.socket))
+        subscriber.receive()
+        assert read() == before + 1
+    counted = 16 * (subscriber.counter.messages - 1)
+    assert counted <= ALLOWANCE * 20 * (time.monotonic() - begun_s)
+    assert subscriber.counter.messages + subscriber.counter.rejected[Reason.BUDGET] == 20
 
 
 def test_a_stop_overtakes_what_waits_and_what_is_handed_out(context: Context, folder: Path, wait: Wait) -> None:

@@ -16,11 +16,12 @@ import zmq
 
 from paramove.bus import topics
 from paramove.bus.endpoint import BusFolderError, TopicTakenError, is_alive, is_held, prepare_folder, socket_path
-from paramove.bus.envelope import Reason
+from paramove.bus.envelope import Reason, RejectedError
 from paramove.bus.publisher import Publisher
-from paramove.bus.subscriber import Subscriber
+from paramove.bus.subscriber import Subscriber, decoded
 from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint
 from paramove.msgs.rule_pb2 import Rules
 from tests.bus.conftest import Wait
 
@@ -238,3 +239,19 @@ def test_a_socket_gone_deaf_after_an_oversized_message_is_opened_anew_and_counte
     assert subscriber.counter.rejected[Reason.CONNECTION] == 1
     assert not subscriber.revive()
     assert re.search("topic gestures: .*for good: a message above 65536 bytes, or no ZeroMQ", caplog.text)
+
+
+def test_a_trajectory_of_too_many_points_is_rejected_before_it_is_decoded_and_never_published(
+    context: Context, folder: Path
+) -> None:
+    most = topics.ARM_TRAJECTORY.max_points or 0
+    message = JointTrajectory(id="long", points=[TrajectoryPoint(time_s=1.0)] * most)
+    assert len(decoded(topics.ARM_TRAJECTORY, message.SerializeToString()).points) == most
+    message.points.add()
+    with pytest.raises(RejectedError) as raised:
+        decoded(topics.ARM_TRAJECTORY, message.SerializeToString())
+    assert raised.value.reason is Reason.LENGTH
+    publisher = Publisher(context, folder, topics.ARM_TRAJECTORY, "synthesizer")
+    with pytest.raises(ValueError, match=f"{most + 1} points"):
+        publisher.publish(message, 0, 0)
+    assert publisher.sequence == 0

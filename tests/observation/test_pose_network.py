@@ -69,7 +69,7 @@ def test_of_two_persons_the_nearer_one_is_followed_and_the_other_noticed():
     np.testing.assert_allclose(near.positions[0] - (640, 240), [SHOULDER, ELBOW, WRIST, HAND], rtol=0.0, atol=16.0)
 
 
-@pytest.mark.parametrize("turns", [1, 2])
+@pytest.mark.parametrize("turns", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_a_turned_picture_is_found_by_voting(turns):
     detector = network()
     for frame in range(20, 30):

@@ -69,7 +69,7 @@ def test_an_arm_that_is_a_folder_reaches_and_relocates(launcher, tmp_path):
     assert all(one["good"] for one in results), results
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_it_calibrates_itself_to_learn_rules(launcher, tmp_path):
     """As far as its own corners; the rest is the same for every arm."""
     ends = ["--headless", "--set", "simulator.max_duration_s=125"]
@@ -78,7 +78,7 @@ def test_it_calibrates_itself_to_learn_rules(launcher, tmp_path):
     assert launcher.truth()["unwanted_contacts"] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_it_puts_the_object_where_a_person_points(launcher, tmp_path):
     options = ["--headless", "--robot", str(described(tmp_path)), "--set", "relocator.places=1"]
     code, shown = launcher.run("relocate_by_pointing", *options)

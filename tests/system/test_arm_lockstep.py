@@ -35,7 +35,11 @@ def run(launcher, name, *arguments):
 
 
 @pytest.mark.parametrize(
-    "arm", [("--with", "lockstep"), ("--with", "koch", "--with", "lockstep", "--robot", "koch_v1_1")]
+    "arm",
+    [
+        ("--with", "lockstep"),
+        pytest.param(("--with", "koch", "--with", "lockstep", "--robot", "koch_v1_1"), marks=pytest.mark.long),
+    ],
 )
 def test_a_run_in_lockstep_is_repeatable(launcher, tmp_path, arm):
     launcher.folder = tmp_path / "runs"

@@ -63,6 +63,7 @@ def test_new_servos_become_an_arm_that_reaches_when_armed_and_stops_when_told(tm
             assert running.wait(120) != 0
 
 
+@pytest.mark.long
 def test_the_application_reaches_and_carries_an_object_without_an_arm(launcher):
     code, shown = launcher.run(*EMULATED.split()[2:], timeout_s=300)
     assert code == 0, shown

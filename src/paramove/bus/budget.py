@@ -2,7 +2,8 @@
 
 A publisher gone wild must not take its subscribers' time. Time is read from the messages' own stamps, on the bus clock:
 so a subscriber that was busy for a while, or simulated time that runs fast, breaks no budget. Commands are limited by
-the subscriber's own clock as well, for stamps may be wrong, and whoever goes on in spite of that is cut off.
+the subscriber's own clock and by their size as well, for stamps may be wrong and a large message keeps its reader busy;
+whoever goes on in spite of that is cut off.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ ALLOWANCE = 1.2
 """Times the topic's nominal rate."""
 BURST = 20
 """Messages beyond that at once."""
-
-
+COUNTED_BYTES = 2**16
+"""By a process's own clock a larger message counts as so many of this size: it takes as much of the reader's time."""
 CUT_OFF_S = 10.0
 """How long a publisher that floods is cut off."""
 PAUSE_NS = 1_000_000_000
@@ -35,8 +36,8 @@ class RateBudget:
         self._level = 0.0
         self._latest_ns = 0
 
-    def admits(self, epoch: int, published_ns: int) -> bool:
-        """Whether a message of that publish time is within the budget, which it then uses up."""
+    def admits(self, epoch: int, published_ns: int, count: float = 1.0) -> bool:
+        """Whether a message of that publish time, counted so often, is within the budget, which it then uses up."""
         if self.rate_hz is None:
             return True
         if epoch != self._epoch:
@@ -44,14 +45,14 @@ class RateBudget:
         if published_ns > self._latest_ns:
             self._level = max(0.0, self._level - (published_ns - self._latest_ns) * self._leak_per_ns)
             self._latest_ns = published_ns
-        if self._level + 1 > BURST:
+        if self._level + count > BURST:
             return False
-        self._level += 1
+        self._level += count
         return True
 
 
 class FloodGuard:
-    """Limits the messages of a topic by this process's own clock, whatever stamps they carry.
+    """Limits the messages of a topic by this process's own clock and their size, whatever stamps they carry.
 
     Args:
         rate_hz: Limit of the topic; None: all are admitted.
@@ -70,10 +71,10 @@ class FloodGuard:
         """Whether the publisher goes on so far beyond the limit that it is to be cut off."""
         return self.excess >= BURST
 
-    def admits(self) -> bool:
-        """Whether a message that has just arrived is within the limit."""
+    def admits(self, n_bytes: int) -> bool:
+        """Whether a message of that size that has just arrived is within the limit."""
         now_ns = time.monotonic_ns()
-        if self._budget.admits(0, now_ns):
+        if self._budget.admits(0, now_ns, max(1.0, n_bytes / COUNTED_BYTES)):
             return True
         paused = now_ns - self._latest_excess_ns > PAUSE_NS
         self.excess = 1 if paused else self.excess + 1

@@ -85,7 +85,7 @@ class Publisher:
             TypeError: the topic carries another type.
             ImpossibleTimeError: a time in it is negative, or one in it or given here is beyond `LATEST_NS`. Never for
                 a request, as a stop counts whatever clock its sender has.
-            ValueError: the message is larger than the topic allows.
+            ValueError: the message is larger than the topic allows, or has more points.
         """
         if type(message) is not self.topic.type:
             type_name = getattr(getattr(message, "DESCRIPTOR", None), "full_name", type(message).__name__)
@@ -94,6 +94,10 @@ class Publisher:
         if len(payload) > self.topic.max_bytes:
             raise ValueError(
                 f"message on {self.topic.name} has {len(payload)} bytes, the topic allows {self.topic.max_bytes}"
+            )
+        if self.topic.max_points is not None and len(message.points) > self.topic.max_points:
+            raise ValueError(
+                f"trajectory on {self.topic.name} has {len(message.points)} points, allowed are {self.topic.max_points}"
             )
         envelope = Envelope(self._schema, self._publisher, self.epoch, self.sequence + 1, now_ns, captured_ns)
         self._check_times(message, envelope)

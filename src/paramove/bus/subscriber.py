@@ -11,13 +11,14 @@ from typing import Any
 import zmq
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 
-from paramove.bus.budget import ALLOWANCE, BURST, CUT_OFF_S, FloodGuard, RateBudget
+from paramove.bus.budget import ALLOWANCE, BURST, COUNTED_BYTES, CUT_OFF_S, FloodGuard, RateBudget
 from paramove.bus.connecting import file_identity
 from paramove.bus.endpoint import holder_of, socket_path
 from paramove.bus.envelope import FLAG_RING, SIZE, Envelope, Reason, RejectedError, unpack
 from paramove.bus.image_ring import OverwrittenError, RingReader
 from paramove.bus.log_format import is_logged
 from paramove.bus.monitor import Monitor, can_read
+from paramove.bus.outline import number_of_points
 from paramove.bus.schemas import schema_hash
 from paramove.bus.sequence import Arrival, SequenceCounter
 from paramove.bus.soundness import LATEST_NS, unsound
@@ -58,7 +59,7 @@ class Received:
 
 
 def decoded(topic: Topic, payload: bytes, numbers: bool = True) -> Any:
-    """The message of a topic; raises RejectedError for a payload that is none, or has unsound numbers.
+    """The message of a topic; raises RejectedError for a payload that is none, has unsound numbers or too many points.
 
     Args:
         topic: Row of the table. A request may have any numbers: nobody reads them, and a stop counts whatever clock its
@@ -67,6 +68,8 @@ def decoded(topic: Topic, payload: bytes, numbers: bool = True) -> Any:
         numbers: Whether unsound numbers are searched for, which takes long for a trajectory of thousands of points.
     """
     try:
+        if topic.max_points is not None:
+            _check_number_of_points(payload, topic.max_points)
         message = topic.type.FromString(payload)
     except (DecodeError, ValueError) as error:
         raise RejectedError(Reason.DECODE, f"payload is not a {topic.type_name}: {error}") from error
@@ -74,6 +77,15 @@ def decoded(topic: Topic, payload: bytes, numbers: bool = True) -> Any:
     if unsound_number:
         raise RejectedError(Reason.NUMBER, f"{unsound_number}; finite numbers expected, correct the publisher")
     return message
+
+
+def _check_number_of_points(payload: bytes, allowed: int) -> None:
+    """Raises RejectedError, and DecodeError for a payload that is no trajectory."""
+    if len(payload) <= allowed:  # a point takes two bytes and more
+        return
+    found = number_of_points(payload)
+    if found > allowed:
+        raise RejectedError(Reason.LENGTH, f"a trajectory of {found} points, allowed are {allowed}; send fewer points")
 
 
 class Subscriber:
@@ -128,7 +140,7 @@ class Subscriber:
     def receive(self, ready: bool = False) -> Received | None:
         """Next new message, or None if none is waiting.
 
-        Repeated and rejected ones are counted and skipped. After many of them it also returns None.
+        Repeated and rejected ones are counted and skipped. After many of them, or a large one, it also returns None.
 
         Args:
             ready: A poll has just shown that something is waiting, so that need not be checked again.
@@ -149,6 +161,8 @@ class Subscriber:
             except RejectedError as error:
                 self.counter.messages -= 1
                 self._reject(error)
+                if len(payload) > COUNTED_BYTES:  # a stop is looked for before the next one
+                    return None
                 continue
             times = envelope.captured_ns, envelope.published_ns
             return Received(self.topic, message, *times, envelope.sequence, envelope.is_welcome and is_first)
@@ -164,7 +178,7 @@ class Subscriber:
                 envelope, payload = self._read()
             except RejectedError as error:
                 self._reject(error)
-                self._admits()
+                self._admits(COUNTED_BYTES)  # its size is not known
                 continue
             except OverwrittenError:  # the gap in the sequence counts it
                 continue
@@ -173,9 +187,11 @@ class Subscriber:
             if self.counter.epoch is None and self.topic.type is not NodeStatus:  # of a status the last one is enough
                 self.counter.from_first = file_identity(self._path) != self._found
             arrival = self.counter.accept(envelope)
-            if arrival is Arrival.NEW and not self._admits():
+            if arrival is Arrival.NEW and not self._admits(len(payload)):
                 self.counter.messages -= 1
                 self._reject(RejectedError(Reason.BUDGET, self._budget_message()))
+                if len(payload) > COUNTED_BYTES:  # a stop is looked for before the next one
+                    return None
                 continue
             if arrival is Arrival.NEW:
                 return envelope, payload
@@ -273,9 +289,9 @@ class Subscriber:
             times = f"published at {envelope.published_ns} ns, captured at {envelope.captured_ns} ns"
             raise RejectedError(Reason.NUMBER, f"{times}: at most {LATEST_NS} ns expected")
 
-    def _admits(self) -> bool:
+    def _admits(self, n_bytes: int) -> bool:
         """Whether a message that has just arrived is within the topic's limit; cuts off a publisher that floods."""
-        admitted = self._guard.admits()
+        admitted = self._guard.admits(n_bytes)
         if self._guard.floods and not self.cut_off:
             self._cut_off_until_s = time.monotonic() + CUT_OFF_S
             self.cut_off = (
@@ -299,7 +315,8 @@ class Subscriber:
         rate_hz = self.topic.budget_hz or 0.0
         return (
             f"{holder_of(self._path) or 'its publisher'} publishes more than {ALLOWANCE * rate_hz:g} a second and "
-            f"{BURST} at once; the topic's rate is {rate_hz:g} Hz. Excess messages are dropped; correct the publisher"
+            f"{BURST} at once; the topic's rate is {rate_hz:g} Hz. Excess messages are dropped (a large command "
+            "counts as several); correct the publisher"
         )
 
     def _two_publishers_message(self, envelope: Envelope) -> str:

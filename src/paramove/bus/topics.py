@@ -57,6 +57,8 @@ class Topic:
         max_bytes: Largest payload; a larger one is rejected by the publisher and by every subscriber.
         limit_hz: At most so many a second are of use where messages come with events: a subscriber drops the excess
             undecoded, and cuts off a publisher that goes on (see `paramove.bus.budget`). None: no limit.
+        max_points: Most points of a trajectory: a subscriber counts them before it decodes them, which would take it
+            many times as long. None: no limit.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Topic:
     recorded: bool = False
     max_bytes: int = 2**16
     limit_hz: float | None = None
+    max_points: int | None = None
 
     @property
     def type_name(self) -> str:
@@ -164,7 +167,14 @@ SPEECH = Topic("speech", Speech, None, _QUEUE, recorded=True)
 RELOCATION_GOAL = Topic("relocation/goal", RelocationGoal, None, _QUEUE, "right_shoulder", recorded=True)
 RELOCATION_STATUS = Topic("relocation/status", RelocationStatus, None, _QUEUE, recorded=True)
 ARM_TRAJECTORY = Topic(
-    "arm/trajectory", JointTrajectory, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES, limit_hz=20
+    "arm/trajectory",
+    JointTrajectory,
+    None,
+    _QUEUE,
+    recorded=True,
+    max_bytes=_MOVEMENT_BYTES,
+    limit_hz=20,
+    max_points=20_000,
 )
 ARM_TRAJECTORY_STATUS = Topic("arm/trajectory_status", TrajectoryStatus, None, _QUEUE, recorded=True)
 ARM_JOINT_STATES = Topic("arm/joint_states", JointStates, 15, _QUEUE, recorded=True)

@@ -113,6 +113,7 @@ def test_a_dark_picture_is_told(tmp_path, recording, models):
         replay.replayed(tmp_path, models=models)
 
 
+@pytest.mark.long
 def test_the_real_recording_keeps_the_goals():
     """One seed of the five that the goals are means of: 3 cm and 1.5 degrees more."""
     try:

@@ -8,6 +8,7 @@ ticks or batches stop, the robot rests by itself.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -120,7 +121,7 @@ class ArmDriver:
         self._arming_requests: list[ArmingRequest] = []
         self._trajectories: list[tuple[JointTrajectory, int]] = []
         self._stop: Fault | None = None
-        self._person_stops: list[tuple[Fault, bool]] = []
+        self._person_stops: deque[tuple[Fault, bool]] = deque()  # filled by another thread
         self._stopped_before = False
         self._arming_faults: tuple[Fault, ...] = ()
         self._checks_began_ns: int | None = None
@@ -171,6 +172,8 @@ class ArmDriver:
     def on_stop(self, message: StopRequest, resent: bool = False) -> None:
         """Take a person's stop: the next `tick` begins a controlled stop and latches it, whatever the gate does.
 
+        May be called from another thread than `tick`.
+
         Args:
             message: The request; its time does not count.
             resent: Whether it was published before the driver had subscribed (see `Received.resent`).
@@ -190,6 +193,11 @@ class ArmDriver:
     def wants_to_arm(self) -> bool:
         """Whether a request waits for the next `tick` that may arm."""
         return any(one.armed and (one.by_person or not self._why_no_program()) for one in self._arming_requests)
+
+    @property
+    def has_stop(self) -> bool:
+        """Whether a person's stop waits for the next `tick`."""
+        return bool(self._person_stops)
 
     def _why_no_program(self) -> str:
         touched = self._stopped_before or not self._core.untouched
@@ -263,12 +271,12 @@ class ArmDriver:
 
     def _judge_stops(self) -> None:
         """Latch stops; one that was sent again to a driver that was never armed may have stopped an earlier one."""
-        for fault, resent in self._person_stops:
+        for _ in range(len(self._person_stops)):
+            fault, resent = self._person_stops.popleft()
             if resent and self._core.untouched:
                 self._stopped_before = True
             else:
                 self._stop = fault
-        self._person_stops.clear()
 
     def _judge_trajectories(self, stalled_s: float) -> None:
         """Accept or reject what came since the last tick."""
@@ -328,7 +336,7 @@ class ArmDriver:
     def check_on(self) -> bool:
         """Checks a waiting trajectory for some milliseconds; returns whether there is more to check.
 
-        May be called from another thread than `tick`, without its lock.
+        May be called from another thread than `tick`.
         """
         check = self._check
         return check is not None and check.go_on()

@@ -17,7 +17,7 @@ from dynamixel_emulator.servo import EmulatedServo
 from dynamixel_emulator.wire_faults import WireFaults
 from paramove.bus import topics
 from paramove.documents.input_error import InputError
-from paramove.msgs.safety_state_pb2 import LinkState, StopRequest
+from paramove.msgs.safety_state_pb2 import LinkState, SafetyState, StopRequest
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.driven_arm import SLOW_NS, DrivenArm
 from paramove.robots.dynamixel.arm.servo_arm import ServoArm, Timeouts
@@ -25,6 +25,7 @@ from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
 from paramove.robots.dynamixel.arm.setup import joint_servos, servo_port
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
+from paramove.robots.streaming.driver import DriverOutput
 from sim.emulated_arm import emulated_servos
 from tests.robots.dynamixel.person import Person
 from tests.robots.dynamixel.untrue_replies import OneAsTheNext, OneElsewhere
@@ -180,6 +181,41 @@ def test_a_stop_ends_the_movement_and_only_a_new_word_arms_again(person):
     assert person.memory("Torque Enable") == [1] * 5
     person.arms()
     person.waits_for("ARMED")
+
+
+def test_who_sends_a_stop_does_not_wait_for_servos_that_keep_the_loop_waiting(person, monkeypatch):
+    """A loop that is late all the time would otherwise keep the stop from being taken at all."""
+    person.arms_and_waits()
+    person.moves()
+    arm = person.arm._loop.arm
+    reads, goes_on, measured = threading.Event(), threading.Event(), arm.measured
+
+    def slowly_measured():
+        reads.set()
+        goes_on.wait(60.0)
+        return measured()
+
+    monkeypatch.setattr(arm, "measured", slowly_measured)
+    assert reads.wait(60.0)
+    sends = threading.Thread(target=person.arm.on_stop, args=(StopRequest(source="person"),))
+    sends.start()
+    sends.join(5.0)
+    waits = sends.is_alive()
+    goes_on.set()
+    assert not waits
+    person.waits_for("HOLD")
+    assert ("person_stop", "") in person.codes()
+
+
+def test_every_change_of_state_is_published_as_it_was_at_its_tick(person, monkeypatch):
+    """Whatever state the driver has by then: it may be in its next tick."""
+    changes = [SafetyState.STATE_ARMED, SafetyState.STATE_STOPPING, SafetyState.STATE_HOLD]
+    outputs = [[DriverOutput(None, None, (), SafetyState(state=state))] for state in changes]
+    monkeypatch.setattr(person.arm._loop, "take", lambda: outputs.pop(0) if outputs else [])
+    said = [list(person.arm.said()) for _ in changes]
+    assert [[one.state for topic, one, _ in some if topic is topics.ARM_SAFETY] for some in said] == [
+        [state] for state in changes
+    ]
 
 
 def test_a_stop_waits_for_no_position_that_is_withheld(person):

@@ -143,15 +143,13 @@ def test_logic_that_hangs_while_the_loop_lives_ends_in_the_stop_ramp(emulator):
         person.arms_and_waits()
         moves(person)
         loop = person.arm._loop
-        with loop.lock:
-            tick, loop._tick = loop._tick, lambda now_ns: None
+        tick, loop._tick = loop._tick, lambda now_ns: None
         person.hears_until(lambda: loop._reader.at_rest)
         rested, packets = memory(emulator, "Goal Position"), emulator.bus.checker.packets
         person.hears_until(lambda: emulator.bus.checker.packets > packets + 20)
         assert memory(emulator, "Goal Position") == rested
         assert memory(emulator, "Bus Watchdog")[0] not in (0, TRIPPED), "the loop still talks to the servos"
-        with loop.lock:
-            loop._tick = tick
+        loop._tick = tick
         person.waits_for("HOLD")
         (fault,) = person.safety.faults
         assert fault.code in ("driver_stalled", "stream_under_run")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator
+from functools import partial
 from typing import Any, Self
 
 import mujoco
@@ -13,14 +14,14 @@ import numpy as np
 from paramove.bus import Topic, topics
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.motor_status_pb2 import MotorStatus
-from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, StopRequest
+from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, SafetyState, StopRequest
 from paramove.robots import RobotDescription
 from paramove.robots.dynamixel.arm.servo_arm import ServoArm
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.servo_loop import LoopSettings, ServoLoop
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.robots.streaming import ArmDriver
-from paramove.safety import SafetySettings, SelfCollision, State
+from paramove.safety import SafetySettings, SelfCollision
 
 FOLLOWING = float(np.deg2rad(10.0))
 """How far a joint may be from its commanded position: more means that somebody or something holds it."""
@@ -65,7 +66,7 @@ class DrivenArm:
         self.readable, self._written = os.pipe2(os.O_NONBLOCK)
         self._loop = ServoLoop(self._driver, description, servos, port, settings, self._wake)
         self._slow_ns = self._safety_ns = self._motors_ns = 0
-        self._state: State | None = None
+        self._published_state: SafetyState.State | None = None
 
     def __enter__(self) -> Self:
         self._loop.__enter__()
@@ -98,13 +99,11 @@ class DrivenArm:
 
     def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
         """Take a trajectory; the loop accepts or rejects it within a period."""
-        with self._loop.lock:
-            self._driver.on_trajectory(message, captured_ns)
+        self._loop.hand_over(partial(self._driver.on_trajectory, message, captured_ns))
 
     def on_arm_request(self, message: ArmRequest, captured_ns: int) -> None:
         """Take an arming request, to arm or disarm."""
-        with self._loop.lock:
-            self._driver.on_arm_request(message, captured_ns)
+        self._loop.hand_over(partial(self._driver.on_arm_request, message, captured_ns))
 
     def on_link(self, message: LinkState, captured_ns: int) -> None:
         """Take that the other hosts reply; at once, whatever the loop is doing."""
@@ -112,9 +111,8 @@ class DrivenArm:
 
     def on_stop(self, message: StopRequest, resent: bool = False) -> None:
         """Take a person's stop: the stop ramp begins in the next period. `resent`: see `ArmDriver.on_stop`."""
-        with self._loop.lock:
-            self._driver.on_stop(message, resent)
-        self._loop.tick()
+        self._driver.on_stop(message, resent)
+        self._loop.stop_waits()
 
     def check_on(self) -> bool:
         """Checks a waiting trajectory for some milliseconds while the loop goes on; returns whether there is more."""
@@ -136,10 +134,11 @@ class DrivenArm:
         states = [one.joint_states for one in output if one.joint_states is not None]
         yield from ((topics.ARM_JOINT_STATES_FAST, one, one.timestamp.ToNanoseconds()) for one in states)
         yield from ((topics.ARM_TRAJECTORY_STATUS, status, now_ns) for one in output for status in one.statuses)
+        safety = output[-1].safety if output else None  # the driver itself may already be in its next tick
         due = now_ns - self._safety_ns >= SLOW_NS
-        if output and (due or self._driver.state is not self._state):
-            self._state, self._safety_ns = self._driver.state, now_ns
-            yield topics.ARM_SAFETY, output[-1].safety, now_ns
+        if safety is not None and (due or safety.state != self._published_state):
+            self._published_state, self._safety_ns = safety.state, now_ns
+            yield topics.ARM_SAFETY, safety, now_ns
         if states and now_ns - self._slow_ns >= SLOW_NS:
             self._slow_ns = now_ns
             yield topics.ARM_JOINT_STATES, states[-1], states[-1].timestamp.ToNanoseconds()

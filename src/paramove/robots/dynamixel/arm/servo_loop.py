@@ -6,7 +6,9 @@ period. So an arm whose driver has stopped comes to rest in the same way.
 
 from __future__ import annotations
 
+import gc
 import logging
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -45,7 +47,9 @@ REOPEN_S = 0.5
 WATCHDOG_FRACTION = 0.5
 """Of the servos' watchdog: after a longer pause of the loop they are asked whether they have stopped by themselves."""
 REST_S = 0.0002
-"""A loop that is late releases its lock for so long each period: otherwise other threads never get it."""
+"""A loop that is late rests for so long each period: otherwise other threads hardly get the interpreter."""
+SWITCH_S = 0.0005
+"""Another thread that computes gives the interpreter back so soon: the loop needs it after each of its exchanges."""
 NOT_EMULATED = "its servos are not emulated by this launch"
 SETTLED_S, LONGEST_SETTLING_S = 0.1, 0.4
 """Servos lag behind their goals: an arm has come to rest when none moves by more than a pulse for so long."""
@@ -116,8 +120,6 @@ class ServoLoop:
         """Why the port is not open; "" while it is."""
         self.pressed = ""
         """Why the emergency stop is pressed, for people; "" if it is not."""
-        self.lock = threading.Lock()
-        """Held while the loop uses the driver; hold it to call the driver."""
         self._description = description
         self._period_s = 1e-6 * description.stream.period_us
         self._period_ns = 1000 * description.stream.period_us
@@ -128,7 +130,8 @@ class ServoLoop:
         self.arm = ServoArm(servos, ServoChain(port), self._period_s, settings.timeouts)
         """The servos; others after the port was lost and opened again."""
         self._reader: StreamReader | None = None
-        self._output: deque[DriverOutput] = deque()  # needs no lock: a check of a trajectory would hold it for long
+        self._output: deque[DriverOutput] = deque()
+        self._inbox: deque[Callable[[], None]] = deque()
         self._step = 0
         self._begun_s, self._pause_s = self._now_s, 0.0
         self._urgent = self._ended = self._normal_end = False
@@ -136,7 +139,7 @@ class ServoLoop:
         self._reopen_s = 0.0
         self._paced = isinstance(port.clock, EmulatorClock)
         self._due_ns = self._period_ns
-        self._stopped = threading.Event()
+        self._stopped, self._woken = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="servo_loop", daemon=True)
 
     @property
@@ -146,12 +149,15 @@ class ServoLoop:
     def __enter__(self) -> Self:
         self._open()
         if not self._paced:
+            sys.setswitchinterval(SWITCH_S)
+            gc.freeze()  # what is there stays: to look through it takes some periods
             self._thread.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._normal_end = kind is None
         self._stopped.set()
+        self._woken.set()
         if isinstance(self._clock, EmulatorClock):
             self._run()
             self._clock.close()
@@ -171,13 +177,18 @@ class ServoLoop:
         while self._paced and self._due_ns <= time_ns:
             self._clock.wait_until(self._due_ns)
             self._due_ns += self._period_ns
-            with self.lock:
-                self._one_period()
+            self._one_period()
 
-    def tick(self) -> None:
-        """Run the driver's logic at once: a stop does not wait for the next period."""
-        with self.lock:
+    def hand_over(self, act: Callable[[], None]) -> None:
+        """What the next period does first, in the thread that uses the driver."""
+        self._inbox.append(act)
+
+    def stop_waits(self) -> None:
+        """A stop waits in the driver: act on it at once, or as soon as the servos have answered what they are asked."""
+        if self._paced:
             self._tick(self._clock.now_ns)
+        else:
+            self._woken.set()
 
     @property
     def has_failed(self) -> bool:
@@ -190,19 +201,29 @@ class ServoLoop:
             while not self._stopped.is_set():
                 # Lost periods are not made up for.
                 due_s = max(due_s + self._period_s, self._now_s - self._period_s)
-                with self.lock:
-                    self._one_period()
+                self._one_period()
                 self._on_output()
-                self._stopped.wait(max(REST_S, due_s - self._now_s))
+                self._rest_until(due_s)
             rests = self._normal_end and self._settings.rest is not None and self._goes_to(self._settings.rest)
-            with self.lock:
-                self._end(rests)
+            self._end(rests)
         finally:
             self._ended = True
+
+    def _rest_until(self, due_s: float) -> None:
+        """The next period; a stop that comes meanwhile is acted on at once."""
+        if not self._woken.wait(max(REST_S, due_s - self._now_s)):
+            return
+        self._woken.clear()
+        if self.driver.has_stop:
+            self._tick(self._clock.now_ns)
+            self._on_output()
+        self._stopped.wait(max(REST_S, due_s - self._now_s))
 
     def _one_period(self) -> None:
         begun_s, self._begun_s = self._begun_s, self._now_s
         self._pause_s = self._begun_s - begun_s
+        for _ in range(len(self._inbox)):
+            self._inbox.popleft()()
         self._look_at_emergency_stop()
         try:
             if self.lost:
@@ -215,7 +236,8 @@ class ServoLoop:
             self._reader = None
             self._report(Fault("port_lost", "", f"{error} The arm rests by its servos' own watchdog; arm again"))
         now_ns = self._clock.now_ns
-        if self._urgent or self._step % self._tick_steps == 0 or self.driver.is_cut_off(now_ns):
+        is_due = self._step % self._tick_steps == 0
+        if is_due or self._urgent or self.driver.has_stop or self.driver.is_cut_off(now_ns):
             self._tick(now_ns)
         self._step += 1
 
@@ -314,15 +336,13 @@ class ServoLoop:
                 if self._now_s + duration_s + EXIT_MARGIN_S > ends_s:
                     break
                 name, reason = message.id, "it was stopped before it arrived"
-                with self.lock:
-                    self.driver.on_trajectory(message, self._clock.now_ns)
+                self.driver.on_trajectory(message, self._clock.now_ns)
             elif self._now_s > ends_s:
                 reason = "it took too long"
                 break
             begun_ns = self._clock.now_ns
             self.driver.check_on()
-            with self.lock:
-                self._one_period()
+            self._one_period()
             self._clock.wait_until(begun_ns + self._period_ns)
             statuses = [one for output in self.take() for one in output.statuses if one.trajectory_id == name]
             if statuses and statuses[-1].state == TrajectoryStatus.STATE_SUCCEEDED:

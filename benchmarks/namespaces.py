@@ -18,14 +18,12 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 HERE, THERE = "10.99.0.1", "10.99.0.2"
 NAMES = ("camera-pc", "robot-pc")
 """Of the second host, on the first one."""
 CLOCK_AHEAD_S = 5000
 """The monotonic clock of `there`, which has a time namespace of its own."""
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).resolve().parent.parent
 STAND_IN = ROOT / "tests" / "supervision" / "ssh_stand_in.py"
 _TUNSETIFF, _TUN_WITHOUT_HEAD = 0x400454CA, 0x1001
 _MTU = 9000
@@ -36,22 +34,25 @@ def ip(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 class Namespaces:
-    """While a context: `within` and `within_there` are what commands begin with."""
+    """While a context: `names` are those of the namespaces, `within` and `within_there` what commands begin with.
+
+    Raises OSError on entering where there are none: for others than root, or without /dev/net/tun.
+    """
 
     def __init__(self, seed: int = 0) -> None:
-        self._names = [f"paramove_{side}_{os.getpid()}" for side in ("here", "there")]
+        self.names = [f"paramove_{side}_{os.getpid()}" for side in ("here", "there")]
         self._devices = [f"pm{index}_{os.getpid()}" for index in range(2)]
-        self.within, there = (("ip", "netns", "exec", name) for name in self._names)
+        self.within, there = (("ip", "netns", "exec", name) for name in self.names)
         self.within_there = (*there, "unshare", "--time", "--monotonic", str(CLOCK_AHEAD_S), "--fork", "--kill-child")
         self._seed = seed
         self._opened = contextlib.ExitStack()
 
     def __enter__(self) -> Namespaces:
-        for name in self._names:
+        for name in self.names:
             if ip("netns", "add", name).returncode:
-                pytest.skip("network namespaces need root")
+                raise OSError("network namespaces need root")
             self._opened.callback(ip, "netns", "del", name)
-        names = Path("/etc/netns", self._names[0])  # `ip netns exec` lays what is in it over /etc
+        names = Path("/etc/netns", self.names[0])  # `ip netns exec` lays what is in it over /etc
         names.mkdir(parents=True)
         self._opened.callback(shutil.rmtree, names)
         (names / "hosts").write_text(f"127.0.0.1 localhost\n{THERE} {' '.join(NAMES)}\n")
@@ -63,8 +64,8 @@ class Namespaces:
         self._opened.callback(self._end_link)
         assert self._link.stdout is not None
         if self._link.stdout.readline() != b"ready\n":
-            pytest.skip("there is no /dev/net/tun")
-        for name, device, address in zip(self._names, self._devices, (HERE, THERE), strict=True):
+            raise OSError("there is no /dev/net/tun")
+        for name, device, address in zip(self.names, self._devices, (HERE, THERE), strict=True):
             ip("link", "set", device, "netns", name)
             ip("-n", name, "addr", "add", f"{address}/24", "dev", device)
             ip("-n", name, "link", "set", device, "mtu", str(_MTU))
@@ -83,7 +84,7 @@ class Namespaces:
 
     def processes(self) -> list[int]:
         """Of the other host."""
-        return [int(pid) for pid in ip("netns", "pids", self._names[1]).stdout.split()]
+        return [int(pid) for pid in ip("netns", "pids", self.names[1]).stdout.split()]
 
     def agent(self) -> int:
         """Process of the agent on the other host."""
