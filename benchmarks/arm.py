@@ -74,7 +74,8 @@ class Emulation:
     def __init__(self, folder: Path, baud_rate: int, link: Path, *options: str) -> None:
         command = [sys.executable, __file__, "--robot", str(folder), "--emulate", str(link), "--baud", str(baud_rate)]
         command += options
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, start_new_session=True)
         self.does("ready")
 
     @property

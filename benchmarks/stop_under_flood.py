@@ -8,8 +8,9 @@ commands a movement and then publishes trajectories as fast as it can. At some t
 once. Measured by the wall clock from when it is published to the driver until the driver publishes the gate's answer,
 after the first rows of the stop; a servo arm plays the first of them within one more period, which is added. A driver
 that has been flooded keeps its publisher out for a while, so some scenes take turns, each with the next part of the
-movement. With two hosts program and person are on another bus, and two relays are between them and the driver: over the
-loopback, or each in a network namespace, which needs root. There the last column begins with the person.
+movement. Driver, relays and servos have the priority that the launcher gives them, where that is allowed. With two
+hosts program and person are on another bus, and two relays are between them and the driver: over the loopback, or each
+in a network namespace, which needs root. There the last column begins with the person.
 
     valid     short movements       invalid   1 MB each, of tens of thousands of points, the last one NaN
     large     20 000 points each    many      two points each
@@ -57,6 +58,7 @@ from paramove.robots import RobotDescription
 from paramove.robots.hoap3 import receive, state_message
 from paramove.robots.streaming import StreamReader
 from paramove.safety import PERSON_STOP, minimum_jerk
+from paramove.supervision import prioritise
 
 ROOT = Path(__file__).resolve().parent.parent
 KINDS = ("valid", "invalid", "large", "many", "checked")
@@ -75,7 +77,6 @@ STATE_S = 1 / 15
 FIRST_PORT = 47_300
 SCENES, TURN_S = 6, 10.5
 """A scene's next turn comes later than a flood's publisher is kept out."""
-SERVOS_PRIORITY = -15
 CONNECTS_S = 0.5
 """Until relays that were paused are connected again."""
 TIMES = ("p50_ms", "p99_ms", "max_ms", "person_max_ms")
@@ -336,6 +337,7 @@ def joined(
         arguments = (within[index], str(folder), folder.name, settings.model_dump(mode="json"), there)
         started.append(make.Process(target=relay_within, args=arguments, daemon=True))
         started[-1].start()
+        prioritise(started[-1].pid or 0, "high")
         assert here.recv() == "ready"
     try:
         yield folders[0], folders[1], [process.pid for process in started if process.pid]
@@ -348,8 +350,9 @@ def joined(
 @contextlib.contextmanager
 def program(*command: str, cwd: Path = ROOT) -> Iterator[subprocess.Popen[str]]:
     """A process, while this is a context."""
+    pipe = subprocess.PIPE
     with subprocess.Popen(
-        command, cwd=cwd, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        command, cwd=cwd, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True, start_new_session=True
     ) as process:
         try:
             yield process
@@ -417,14 +420,15 @@ def scene(name: str, kind: str, hosts: int, number: int = 0, namespaces: Namespa
             emulation = Emulation(folder, robot.bus.baud_rate, link)
             opened.callback(emulation.end)
             paused.append(emulation.pid)
-            with contextlib.suppress(PermissionError):  # real servos have processors of their own
-                os.setpriority(os.PRIO_PROCESS, emulation.pid, SERVOS_PRIORITY)
+            prioritise(emulation.pid, "high")  # real servos have processors of their own
             parameters |= {"port": str(link), "timeouts": TIMEOUTS}
         node = "arm_driver" if robot.bus is None else "servo_arm_driver"
         config = Path(root) / "driver.yaml"
         bus = {"folder": str(driver), "clock": "monotonic"}
         config.write_text(json.dumps({"node": "driver", "bus": bus, "parameters": parameters, "run_folder": root}))
-        paused.append(opened.enter_context(program(sys.executable, "-m", f"nodes.{node}", "--config", str(config))).pid)
+        driving = opened.enter_context(program(sys.executable, "-m", f"nodes.{node}", "--config", str(config)))
+        prioritise(driving.pid, "high")
+        paused.append(driving.pid)
         flooder = opened.enter_context(program(sys.executable, __file__, "--flood", str(desk), name, kind))
         beside = opened.enter_context(BusVisitor(driver, "world"))
         person = beside if hosts == 1 else opened.enter_context(BusVisitor(desk, "person"))

@@ -103,18 +103,6 @@ class SupervisedProcess:
         self._guard = guard
         guard.watch(self.pid)
 
-    def prioritise(self, nice: int) -> None:
-        """Gives the process a nice value; without effect where the system does not allow it.
-
-        Linux shares the processor between sessions first (autogroup), and each node has its own: both are set.
-        """
-        if nice == 0:
-            return
-        with contextlib.suppress(PermissionError, ProcessLookupError):
-            os.setpriority(os.PRIO_PROCESS, self.pid, nice)
-        with contextlib.suppress(OSError):
-            Path(f"/proc/{self.pid}/autogroup").write_text(str(nice), encoding="ascii")
-
     def ended(self) -> int | None:
         """Exit code (negative: number of the signal) once the process has ended, else None.
 
@@ -175,8 +163,22 @@ def node_process(
         guard=guard,
         log=run_folder.log(name),
     )
-    process.prioritise(NICE[settings.priority])
+    prioritise(process.pid, settings.priority)
     return process
+
+
+def prioritise(pid: int, priority: str) -> None:
+    """Gives a process that has just started the nice value of a priority; without effect where that is not allowed.
+
+    Linux shares the processor between sessions first (autogroup), and each node has its own: both are set.
+    """
+    nice = NICE[priority]
+    if nice == 0:
+        return
+    with contextlib.suppress(PermissionError, ProcessLookupError):
+        os.setpriority(os.PRIO_PROCESS, pid, nice)
+    with contextlib.suppress(OSError):
+        Path(f"/proc/{pid}/autogroup").write_text(str(nice), encoding="ascii")
 
 
 def last_lines(file: Path, count: int) -> list[str]:
