@@ -10,7 +10,7 @@ import pytest
 
 from paramove.documents.wording import printable
 from paramove.supervision.launch_schema import NodeSettings
-from paramove.supervision.processes import Guard, SupervisedProcess, last_lines, node_process
+from paramove.supervision.processes import NICE, Guard, SupervisedProcess, last_lines, node_process, prioritise
 from paramove.supervision.run_folder import RunFolder
 from paramove.workspace import Workspace
 from tests.supervision.conftest import until
@@ -133,10 +133,11 @@ def test_control_characters_are_written_out(text, shown):
     assert printable(text) == shown
 
 
-def test_priority_is_that_of_the_process_and_of_its_session(guard, tmp_path):
+def test_priority_is_that_of_the_process_and_of_its_session(guard, tmp_path, monkeypatch):
     process = started(guard, tmp_path, "import signal; signal.pause()")
     lower = min(19, os.getpriority(os.PRIO_PROCESS, 0) + 5)  # which everybody may
-    process.prioritise(lower)
+    monkeypatch.setitem(NICE, "low", lower)
+    prioritise(process.pid, "low")
     assert os.getpriority(os.PRIO_PROCESS, process.pid) == lower
     group = Path(f"/proc/{process.pid}/autogroup")
     assert not group.exists() or group.read_text().split()[-1] == str(lower)
