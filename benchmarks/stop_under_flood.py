@@ -2,6 +2,7 @@
 
     python benchmarks/stop_under_flood.py [--stops 100] [--robots hoap3,open_manipulator_x] [--kinds valid,large]
                                           [--hosts 1,2] [--namespaces] [--busy 2] [--json FILE]
+                                          [--driver-of CHECKOUT]
 
 In each scene there are the real driver node, emulated servos or a robot that only plays its stream, and a program that
 commands a movement and then publishes trajectories as fast as it can. At some time of the movement a stop is published
@@ -408,8 +409,18 @@ class Scene:
 
 
 @contextlib.contextmanager
-def scene(name: str, kind: str, hosts: int, number: int = 0, namespaces: Namespaces | None = None) -> Iterator[Scene]:
-    """With new processes; scenes that are there at the same time have numbers of their own."""
+def scene(
+    name: str,
+    kind: str,
+    hosts: int,
+    number: int = 0,
+    namespaces: Namespaces | None = None,
+    driver_of: Path | None = None,
+) -> Iterator[Scene]:
+    """With new processes; scenes that are there at the same time have numbers of their own.
+
+    The driver is that of another checkout with a `.venv`, if one is given.
+    """
     folder = ROOT / "robot_description" / name
     robot = RobotDescription.load(folder)
     with tempfile.TemporaryDirectory(prefix="pm-") as root, contextlib.ExitStack() as opened:
@@ -426,7 +437,9 @@ def scene(name: str, kind: str, hosts: int, number: int = 0, namespaces: Namespa
         config = Path(root) / "driver.yaml"
         bus = {"folder": str(driver), "clock": "monotonic"}
         config.write_text(json.dumps({"node": "driver", "bus": bus, "parameters": parameters, "run_folder": root}))
-        driving = opened.enter_context(program(sys.executable, "-m", f"nodes.{node}", "--config", str(config)))
+        python = str(driver_of / ".venv" / "bin" / "python") if driver_of else sys.executable
+        command = (python, "-m", f"nodes.{node}", "--config", str(config))
+        driving = opened.enter_context(program(*command, cwd=driver_of or ROOT))
         prioritise(driving.pid, "high")
         paused.append(driving.pid)
         flooder = opened.enter_context(program(sys.executable, __file__, "--flood", str(desk), name, kind))
@@ -495,6 +508,7 @@ def main() -> None:
         "--namespaces", action="store_true", help="each of two hosts is a network namespace; needs root"
     )
     parser.add_argument("--busy", type=int, default=0, help="programs that never rest")
+    parser.add_argument("--driver-of", type=Path, help="another checkout with a .venv, to compare")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--flood", nargs=3, help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -515,7 +529,7 @@ def main() -> None:
         for case in cases:
             with contextlib.ExitStack() as opened_here:
                 scenes = [
-                    opened_here.enter_context(scene(*case, number, namespaces))
+                    opened_here.enter_context(scene(*case, number, namespaces, options.driver_of))
                     for number in range(min(SCENES, options.stops))
                 ]
                 for _ in range(options.busy):

@@ -445,6 +445,20 @@ def stop_button(out: Path) -> dict[str, Any]:
     return {"median_ms": float(median), "largest_ms": float(largest)}
 
 
+def stop_under_flood(out: Path) -> dict[str, Any]:
+    """By robot and number of hosts: stops, and ms until the first row of one, of the kind of flood that is worst."""
+    found: dict[str, dict[str, float]] = {}
+    for hosts in ("one_host", "two_hosts"):
+        for row in load(out / f"{hosts}.json")["rows"]:
+            worst = found.setdefault(f"{row['robot']}_{row['hosts']}", {})
+            for name in ("stops", "left_out"):
+                count = row[name] if name == "stops" else len(row[name])
+                worst[name] = worst.get(name, 0) + count
+            for name in ("p50_ms", "p99_ms", "max_ms", "person_max_ms"):
+                worst[name] = max(worst.get(name, 0.0), row[name])
+    return found
+
+
 def tutorial(out: Path) -> dict[str, Any]:
     """What training and recognition print, with the tutorial's paths and without the time that training takes."""
     texts = [(out / f"{n}.txt").read_text(encoding="utf-8").replace(f"{out}/", "") for n in range(6)]
@@ -601,6 +615,17 @@ MEASUREMENTS = {
     ),
     "stop_button": Measurement(
         ("python benchmarks/stop_button.py --presses 10",), stop_button, "a minute", timing=True
+    ),
+    "stop_under_flood": Measurement(
+        (
+            "python benchmarks/stop_under_flood.py --busy 2 --kinds valid,invalid,large,many --hosts 1 "
+            "--json {out}/one_host.json",
+            "python benchmarks/stop_under_flood.py --busy 2 --kinds valid,invalid,large,many --hosts 2 --namespaces "
+            "--stops 50 --json {out}/two_hosts.json",
+        ),
+        stop_under_flood,
+        "an hour, as root",
+        timing=True,
     ),
     "warping_speed": Measurement(
         ("python benchmarks/dtw.py --json {out}/numbers.json",), warping_speed, "a minute", timing=True
