@@ -183,7 +183,8 @@ class Timer:
 
 
 def timer(pipe: Any) -> None:
-    """What that process does."""
+    """What that process does, until it is terminated."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which prints what there is
     pipe.send("ready")
     found: list[tuple[float, float]] = []
     while True:
@@ -325,6 +326,7 @@ def joined(
     rows = {topic.name: topic.name for topic in (topics.ARM_TRAJECTORY, topics.OPERATOR_STOP)}
     make = multiprocessing.get_context("spawn")
     started, pipes = [], []  # a relay ends with its pipe
+    pids: list[int] = []
     for index, (folder, other) in enumerate((folders, folders[::-1])):
         public = keys[other].own().public
         keys[folder].trust(other.name, public)
@@ -338,10 +340,12 @@ def joined(
         arguments = (within[index], str(folder), folder.name, settings.model_dump(mode="json"), there)
         started.append(make.Process(target=relay_within, args=arguments, daemon=True))
         started[-1].start()
-        prioritise(started[-1].pid or 0, "high")
+        assert started[-1].pid is not None
+        pids.append(started[-1].pid)
+        prioritise(pids[-1], "high")
         assert here.recv() == "ready"
     try:
-        yield folders[0], folders[1], [process.pid for process in started if process.pid]
+        yield folders[0], folders[1], pids
     finally:
         for process in started:
             process.terminate()

@@ -451,9 +451,8 @@ def stop_under_flood(out: Path) -> dict[str, Any]:
     for hosts in ("one_host", "two_hosts"):
         for row in load(out / f"{hosts}.json")["rows"]:
             worst = found.setdefault(f"{row['robot']}_{row['hosts']}", {})
-            for name in ("stops", "left_out"):
-                count = row[name] if name == "stops" else len(row[name])
-                worst[name] = worst.get(name, 0) + count
+            worst["stops"] = worst.get("stops", 0) + row["stops"]
+            worst["left_out"] = worst.get("left_out", 0) + len(row["left_out"])
             for name in ("p50_ms", "p99_ms", "max_ms", "person_max_ms"):
                 worst[name] = max(worst.get(name, 0.0), row[name])
     return found

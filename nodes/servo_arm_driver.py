@@ -13,7 +13,7 @@ Publishes   arm/joint_states        foxglove.JointStates   15 Hz   rad
 
 from paramove.bus import TICK_PERIOD_NS, Bus, NodeConfig, Tick, main, topics
 from paramove.robots import RobotFolder, ThisLaunch
-from paramove.robots.dynamixel import DrivenArm, ServoArmSetup
+from paramove.robots.dynamixel import DrivenArm, ServoArmSetup, prefer_the_loop
 from paramove.robots.streaming import command_handlers
 
 SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.HOSTS_LINK)
@@ -32,6 +32,7 @@ def run(bus: Bus, config: Config) -> None:
     launch = ThisLaunch.of(bus.settings)
     paced_in = bus.settings.folder if bus.settings.lockstep else None
     with config.driven_arm(bus.run_folder, launch, paced_in, checks_in_slices=paced_in is None) as arm:
+        prefer_the_loop()
         bus.when_readable(arm.readable, lambda: publish_all(bus, arm))
         bus.when_idle(arm.check_on)
         bus.ready(arm.detail)

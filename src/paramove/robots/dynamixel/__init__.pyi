@@ -3,6 +3,7 @@ from .arm.gravity_compensated_arm import GravityCompensatedArm as GravityCompens
 from .arm.gravity_compensated_arm import TorqueOffArm as TorqueOffArm
 from .arm.servo_arm import Timeouts as Timeouts
 from .arm.servo_loop import LoopSettings as LoopSettings
+from .arm.servo_loop import prefer_the_loop as prefer_the_loop
 from .arm.setup import ServoArmSetup as ServoArmSetup
 from .arm.setup import joint_servos as joint_servos
 from .arm.setup import servo_port as servo_port

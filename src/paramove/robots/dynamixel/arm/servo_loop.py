@@ -149,8 +149,6 @@ class ServoLoop:
     def __enter__(self) -> Self:
         self._open()
         if not self._paced:
-            sys.setswitchinterval(SWITCH_S)
-            gc.freeze()  # what is there stays: to look through it takes some periods
             self._thread.start()
         return self
 
@@ -375,6 +373,15 @@ class ServoLoop:
             self.lost = str(error)
         if not self.lost:
             self._let_go(self._settings.torque_off if self._settings.rest is None else rests)
+
+
+def prefer_the_loop() -> None:
+    """Makes other threads of this process, which is to be there for the loop alone, keep the interpreter for less long.
+
+    They give it back sooner, and what is there already is not looked through for garbage again, which takes periods.
+    """
+    sys.setswitchinterval(SWITCH_S)
+    gc.freeze()
 
 
 def movement_to(
