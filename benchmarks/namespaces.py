@@ -45,23 +45,31 @@ class Namespaces:
         self.within, there = (("ip", "netns", "exec", name) for name in self.names)
         self.within_there = (*there, "unshare", "--time", "--monotonic", str(CLOCK_AHEAD_S), "--fork", "--kill-child")
         self._seed = seed
-        self._opened = contextlib.ExitStack()
 
     def __enter__(self) -> Namespaces:
+        with contextlib.ExitStack() as opened:
+            self._open(opened)
+            self._opened = opened.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._opened.close()
+
+    def _open(self, opened: contextlib.ExitStack) -> None:
         for name in self.names:
             if ip("netns", "add", name).returncode:
                 raise OSError("network namespaces need root")
-            self._opened.callback(ip, "netns", "del", name)
+            opened.callback(ip, "netns", "del", name)
         names = Path("/etc/netns", self.names[0])  # `ip netns exec` lays what is in it over /etc
         names.mkdir(parents=True)
-        self._opened.callback(shutil.rmtree, names)
+        opened.callback(shutil.rmtree, names)
         (names / "hosts").write_text(f"127.0.0.1 localhost\n{THERE} {' '.join(NAMES)}\n")
         self._link = subprocess.Popen(
             ["nice", "-n", "-15", sys.executable, __file__, str(self._seed), *self._devices],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )
-        self._opened.callback(self._end_link)
+        opened.callback(self._end_link)
         assert self._link.stdout is not None
         if self._link.stdout.readline() != b"ready\n":
             raise OSError("there is no /dev/net/tun")
@@ -71,10 +79,6 @@ class Namespaces:
             ip("-n", name, "link", "set", device, "mtu", str(_MTU))
             for one in (device, "lo"):
                 assert ip("-n", name, "link", "set", one, "up").returncode == 0
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._opened.close()
 
     def link(self, delay_s: float = 0.0, jitter_s: float = 0.0, loss: float = 0.0) -> None:
         """How late packets arrive, and which part does not; a `loss` of 1 is a cut link."""

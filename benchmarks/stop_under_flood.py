@@ -2,7 +2,7 @@
 
     python benchmarks/stop_under_flood.py [--stops 100] [--robots hoap3,open_manipulator_x] [--kinds valid,large]
                                           [--hosts 1,2] [--namespaces] [--busy 2] [--json FILE]
-                                          [--driver-of CHECKOUT]
+                                          [--before CHECKOUT]
 
 In each scene there are the real driver node, emulated servos or a robot that only plays its stream, and a program that
 commands a movement and then publishes trajectories as fast as it can. At some time of the movement a stop is published
@@ -11,7 +11,8 @@ after the first rows of the stop; a servo arm plays the first of them within one
 that has been flooded keeps its publisher out for a while, so some scenes take turns, each with the next part of the
 movement. Driver, relays and servos have the priority that the launcher gives them, where that is allowed. With two
 hosts program and person are on another bus, and two relays are between them and the driver: over the loopback, or each
-in a network namespace, which needs root. There the last column begins with the person.
+in a network namespace, which needs root. There the last column begins with the person. With another checkout, which has
+a `.venv`, the drivers of both are measured in the same run; one that has not answered for 60 s is started again.
 
     valid     short movements       invalid   1 MB each, of tens of thousands of points, the last one NaN
     large     20 000 points each    many      two points each
@@ -75,6 +76,7 @@ TIMER_S, STALL_S = 0.010, 0.020
 TIMEOUT_S = 60.0
 START_TIMEOUT_S = 60.0
 STATE_S = 1 / 15
+WIDTH = 130
 FIRST_PORT = 47_300
 SCENES, TURN_S = 6, 10.5
 """A scene's next turn comes later than a flood's publisher is kept out."""
@@ -205,6 +207,11 @@ class Stop:
     received_s: float
     played_s: float
 
+    @property
+    def is_answered(self) -> bool:
+        """Whether the driver has answered in time; otherwise it is never played."""
+        return math.isfinite(self.played_s)
+
 
 class World:
     """The robot and the person, on the buses of the person's host and of the driver's, which may be the same."""
@@ -291,8 +298,6 @@ class World:
         begun_s = time.monotonic()
         publish_now(self._stop, StopRequest(source="benchmark"))
         answered = self.until(lambda gate: any(fault.code == PERSON_STOP for fault in gate.faults), TIMEOUT_S)
-        if not answered:
-            print_line(f"no answer: {self.safety}")
         period_s = 0.0 if self.robot.bus is None else 1e-6 * self.robot.stream.period_us
         self.step()
         received_s = max(begun_s, self._relayed_s)
@@ -378,7 +383,7 @@ class Scene:
         self._pause()
 
     def stopped(self, after_s: float) -> Stop:
-        """A stop so long after the flood has begun."""
+        """A stop so long after the flood has begun; the scene is over if nobody has answered."""
         time.sleep(max(0.0, self._flooded_s + TURN_S - time.monotonic()))
         self._signal(signal.SIGCONT)
         self._world.goes_on(CONNECTS_S if self._world.is_relayed else 0.0)
@@ -388,7 +393,8 @@ class Scene:
         stop = self._world.stop()
         self._says("rest")
         self._flooded_s = time.monotonic()
-        self._pause()
+        if stop.is_answered:
+            self._pause()
         return stop
 
     def __enter__(self) -> Scene:
@@ -412,23 +418,33 @@ class Scene:
         self._flooder.stdin.flush()
 
 
-@contextlib.contextmanager
-def scene(
-    name: str,
-    kind: str,
-    hosts: int,
-    number: int = 0,
-    namespaces: Namespaces | None = None,
-    driver_of: Path | None = None,
-) -> Iterator[Scene]:
-    """With new processes; scenes that are there at the same time have numbers of their own.
+@dataclass(frozen=True)
+class Case:
+    """What is measured, again and again."""
 
-    The driver is that of another checkout with a `.venv`, if one is given.
-    """
-    folder = ROOT / "robot_description" / name
+    robot: str
+    kind: str
+    hosts: int
+    checkout: Path = ROOT
+
+    @property
+    def driver(self) -> str:
+        """Whose driver it is."""
+        return "this" if self.checkout == ROOT else "before"
+
+    def __str__(self) -> str:
+        return f"{self.robot} {self.kind} {self.hosts} {self.driver}"
+
+
+@contextlib.contextmanager
+def scene(case: Case, number: int = 0, namespaces: Namespaces | None = None) -> Iterator[Scene]:
+    """With new processes; scenes that are there at the same time have numbers of their own."""
+    folder = ROOT / "robot_description" / case.robot
     robot = RobotDescription.load(folder)
     with tempfile.TemporaryDirectory(prefix="pm-") as root, contextlib.ExitStack() as opened:
-        desk, driver, paused = opened.enter_context(joined(Path(root), hosts, FIRST_PORT + 20 * number, namespaces))
+        desk, driver, paused = opened.enter_context(
+            joined(Path(root), case.hosts, FIRST_PORT + 20 * number, namespaces)
+        )
         parameters: dict[str, Any] = {"robot": str(folder)}
         if robot.bus is not None:
             link = Path(root) / "usb-emulated_0001-if00-port0"
@@ -441,28 +457,66 @@ def scene(
         config = Path(root) / "driver.yaml"
         bus = {"folder": str(driver), "clock": "monotonic"}
         config.write_text(json.dumps({"node": "driver", "bus": bus, "parameters": parameters, "run_folder": root}))
-        python = str(driver_of / ".venv" / "bin" / "python") if driver_of else sys.executable
+        python = sys.executable if case.checkout == ROOT else str(case.checkout / ".venv" / "bin" / "python")
         command = (python, "-m", f"nodes.{node}", "--config", str(config))
-        driving = opened.enter_context(program(*command, cwd=driver_of or ROOT))
+        driving = opened.enter_context(program(*command, cwd=case.checkout))
         prioritise(driving.pid, "high")
         paused.append(driving.pid)
-        flooder = opened.enter_context(program(sys.executable, __file__, "--flood", str(desk), name, kind))
+        flooder = opened.enter_context(program(sys.executable, __file__, "--flood", str(desk), case.robot, case.kind))
         beside = opened.enter_context(BusVisitor(driver, "world"))
-        person = beside if hosts == 1 else opened.enter_context(BusVisitor(desk, "person"))
+        person = beside if case.hosts == 1 else opened.enter_context(BusVisitor(desk, "person"))
         with Scene(World(robot, person, beside), flooder, paused) as ready:
             yield ready
 
 
-def rows_of(results: dict[tuple[str, str, int], list[tuple[Stop, float]]]) -> list[dict[str, Any]]:
+class Scenes:
+    """Of one case, some that take turns, and so many programs that never rest, while this is a context."""
+
+    def __init__(self, case: Case, count: int, busy: int, namespaces: Namespaces | None) -> None:
+        self._case, self._namespaces, self._busy = case, namespaces, busy
+        self._opened = [contextlib.ExitStack() for _ in range(count)]
+        self._beside = contextlib.ExitStack()
+        self._scenes: list[Scene] = []
+        self._next = 0
+
+    def __enter__(self) -> Scenes:
+        with contextlib.ExitStack() as opened:
+            for one in (self._beside, *self._opened):
+                opened.enter_context(one)
+            self._scenes = [self._new(number) for number in range(len(self._opened))]
+            for _ in range(self._busy):
+                self._beside.enter_context(program(sys.executable, "-c", "while True: pass"))
+            self._all = opened.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._all.close()
+
+    def stopped(self, after_s: float) -> Stop:
+        """A stop of the next scene, so long after its flood has begun."""
+        number = self._next % len(self._scenes)
+        self._next += 1
+        stop = self._scenes[number].stopped(after_s)
+        if not stop.is_answered:
+            self._opened[number].close()
+            self._scenes[number] = self._new(number)
+        return stop
+
+    def _new(self, number: int) -> Scene:
+        return self._opened[number].enter_context(scene(self._case, number, self._namespaces))
+
+
+def rows_of(results: dict[Case, list[tuple[Stop, float]]]) -> list[dict[str, Any]]:
     """Of each case, its stops that count, and those that a stall of the machine fell into."""
     rows = []
-    for (name, kind, hosts), stops in results.items():
-        counted = [stop for stop, stall_s in stops if stall_s <= STALL_S]
-        row: dict[str, Any] = {"robot": name, "kind": kind, "hosts": hosts, "stops": len(counted)}
+    for case, stops in results.items():
+        counted = [stop for stop, stall_s in stops if stall_s <= STALL_S or not stop.is_answered]
+        row: dict[str, Any] = {"robot": case.robot, "kind": case.kind, "hosts": case.hosts}
+        row |= {"driver": case.driver, "stops": len(counted)}
         row["left_out"] = [
             [round(1e3 * (stop.played_s - stop.received_s), 1), round(1e3 * stall, 1)]
             for stop, stall in stops
-            if stall > STALL_S
+            if stall > STALL_S and stop.is_answered
         ]
         if counted:
             times_ms = 1e3 * np.array([stop.played_s - stop.received_s for stop in counted])
@@ -479,12 +533,20 @@ def print_line(text: str) -> None:
     sys.stdout.flush()
 
 
+def _in_ms(time_ms: float | None) -> str:
+    """For the table."""
+    if time_ms is None:
+        return "–"
+    return f"{time_ms:.1f}" if math.isfinite(time_ms) else "never"
+
+
 def print_table(rows: list[dict[str, Any]], late_ms: list[float]) -> None:
     """The table, and the timer beside it."""
     table = Table(
         "robot",
         "flood",
         "hosts",
+        "driver",
         "stops",
         "p50, ms",
         "p99, ms",
@@ -493,10 +555,10 @@ def print_table(rows: list[dict[str, Any]], late_ms: list[float]) -> None:
         "left out: stop / stall, ms",
     )
     for row in rows:
-        times = [f"{row[key]:.1f}" if key in row else "–" for key in TIMES]
+        times = [_in_ms(row.get(key)) for key in TIMES]
         left_out = ", ".join(f"{stop:.0f} / {stall:.0f}" for stop, stall in row["left_out"]) or "–"
-        table.add_row(row["robot"], row["kind"], str(row["hosts"]), str(row["stops"]), *times, left_out)
-    Console().print(table)
+        table.add_row(row["robot"], row["kind"], str(row["hosts"]), row["driver"], str(row["stops"]), *times, left_out)
+    Console(width=WIDTH).print(table)
     late = np.quantile(late_ms, [0.5, 0.99, 1.0]) if late_ms else [math.nan] * 3
     print_line("a timer of 10 ms beside it is late by {:.1f} ms (p50), {:.1f} ms (p99), {:.1f} ms (max)".format(*late))
 
@@ -512,42 +574,38 @@ def main() -> None:
         "--namespaces", action="store_true", help="each of two hosts is a network namespace; needs root"
     )
     parser.add_argument("--busy", type=int, default=0, help="programs that never rest")
-    parser.add_argument("--driver-of", type=Path, help="another checkout with a .venv, to compare")
+    parser.add_argument("--before", type=Path, help="another checkout, with a .venv: its driver is measured, too")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--flood", nargs=3, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.flood:
         flood(*options.flood)
+    checkouts = [ROOT, options.before.resolve()] if options.before else [ROOT]
     cases = [
-        (name, kind, int(hosts))
+        Case(name, kind, int(hosts), checkout)
         for hosts in options.hosts.split(",")
         for name in options.robots.split(",")
         for kind in options.kinds.split(",")
+        for checkout in checkouts
     ]
-    results: dict[tuple[str, str, int], list[tuple[Stop, float]]] = {case: [] for case in cases}
+    results: dict[Case, list[tuple[Stop, float]]] = {case: [] for case in cases}
     late_ms: list[float] = []
     draw = np.random.default_rng(0)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as opened:
         namespaces = opened.enter_context(Namespaces()) if options.namespaces else None
         beside = opened.enter_context(Timer())
         for case in cases:
-            with contextlib.ExitStack() as opened_here:
-                scenes = [
-                    opened_here.enter_context(scene(*case, number, namespaces, options.driver_of))
-                    for number in range(min(SCENES, options.stops))
-                ]
-                for _ in range(options.busy):
-                    opened_here.enter_context(program(sys.executable, "-c", "while True: pass"))
+            with Scenes(case, min(SCENES, options.stops), options.busy, namespaces) as scenes:
                 for number in range(options.stops):
-                    stop = scenes[number % SCENES].stopped(float(draw.uniform(*AFTER_S)))
+                    stop = scenes.stopped(float(draw.uniform(*AFTER_S)))
                     samples = beside.taken()
                     late_ms += [1e3 * late_s for _, late_s in samples]
                     during = [
                         late_s for due_s, late_s in samples if due_s + late_s > stop.begun_s and due_s < stop.played_s
                     ]
                     results[case].append((stop, max(during, default=0.0)))
-                    took_ms = 1e3 * (stop.played_s - stop.received_s)
-                    print_line(f"{' '.join(map(str, case))}: {number + 1} of {options.stops}, {took_ms:.1f} ms")
+                    took = _in_ms(1e3 * (stop.played_s - stop.received_s))
+                    print_line(f"{case}: {number + 1} of {options.stops}, {took} ms")
     rows = rows_of({case: stops for case, stops in results.items() if stops})
     print_table(rows, late_ms)
     if options.json:
