@@ -402,11 +402,24 @@ def _demonstrations(folder: Path) -> tuple[dict[str, list[bytes]], bytes, bytes]
     file.write(str(folder / "take.c3d"))
     takes = {ending: [(folder / f"take{ending}").read_bytes()] for ending in (".npz", ".csv", ".bvh", ".c3d")}
     with contextlib.suppress(RecordingsError):  # the recordings of persons are no part of the repository
-        takes[".npz"] += [path.read_bytes() for path in sorted(data_folder().glob("*/data.npz"))]
+        takes[".npz"] += [_first_takes(path) for path in sorted(data_folder().glob("*/data.npz"))]
     label = Label(0, 120, "reaching", (0.1, 0.2))
     imported = import_file(folder / "take.csv", ImportOptions(unit="mm"), label)
     write_set(folder / "set", imported.takes, ("u", "v"))
     return takes, (folder / "set" / "take.mcap").read_bytes(), (folder / "set" / "labels.yaml").read_bytes()
+
+
+def _first_takes(path: Path, count: int = 20) -> bytes:
+    """The archive with its first takes only: a whole one takes seconds to read, in which dozens can be tried."""
+    with np.load(path, allow_pickle=False) as archive:
+        arrays = dict(archive)
+    n_takes, n_frames = len(arrays["offsets"]) - 1, len(arrays["flat"])
+    cut = {n_takes + 1: count + 1, n_takes: count, n_frames: int(arrays["offsets"][count])}
+    content = io.BytesIO()
+    np.savez_compressed(
+        content, **{name: array[: cut.get(len(array))] if array.ndim else array for name, array in arrays.items()}
+    )
+    return content.getvalue()
 
 
 def models(folder: Path) -> list[bytes]:

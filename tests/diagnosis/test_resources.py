@@ -12,7 +12,9 @@ from paramove.diagnosis.resources import (
     disk_finding,
     environment_findings,
     folder_finding,
+    may_set_any_priority,
     open_files_finding,
+    priority_finding,
     resources_findings,
     sockets_finding,
 )
@@ -119,6 +121,36 @@ def test_little_room_on_a_disk_is_told(tmp_path, free, level):
 )
 def test_too_few_open_files_are_told(limit, level):
     assert open_files_finding(limit).level is level
+
+
+@pytest.mark.parametrize(
+    ("may_set_any", "limit", "level"),
+    [
+        (True, 0, Level.OK),
+        (False, resource.RLIM_INFINITY, Level.OK),
+        (False, 30, Level.OK),
+        (False, 29, Level.WARNING),
+        (False, 0, Level.WARNING),
+    ],
+)
+def test_a_driver_that_may_not_come_before_other_programs_is_told(may_set_any, limit, level):
+    assert priority_finding(may_set_any, limit).level is level
+
+
+@needs_root
+def test_an_ordinary_user_is_told_how_to_get_the_priority():
+    code = "print(json.dumps(told(priority_finding(False, 0))))"
+    line, _ = as_nobody(priority_finding, code)["remedy"]
+    assert line.startswith("echo $(id -un) - nice -10 | sudo tee /etc/security/limits.d/")
+
+
+@needs_root
+def test_the_capability_is_that_of_the_process(tmp_path):
+    status = tmp_path / "status"
+    for mask, may in (("0000000000800000", True), ("000001ffff7fffff", False)):
+        status.write_text(f"CapPrm:\tffffffffffffffff\nCapEff:\t{mask}\n")
+        assert may_set_any_priority(status) == may
+    assert not as_nobody(may_set_any_priority, "print(json.dumps(may_set_any_priority()))")
 
 
 def test_a_variable_in_the_way_is_told(monkeypatch):

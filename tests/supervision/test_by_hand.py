@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from paramove.cli.main import build
-from paramove.documents import exit_codes
+from paramove.documents import MessageReader, exit_codes
 from paramove.supervision.control import MOST_CLIENTS, ControlServer, NoRunError, ask
 from paramove.supervision.messages import Answer, Request
 
@@ -158,6 +158,16 @@ def test_what_is_no_request_is_told_so(server, sent):
         assert answer["sentence"].isprintable()
     server.serve()
     assert len(server.descriptors) == 1
+
+
+def test_of_many_requests_at_once_only_the_first_is_parsed(server, monkeypatch):
+    parsed, read = [], MessageReader.read
+    monkeypatch.setattr(MessageReader, "read", lambda reader, line: (parsed.append(line), read(reader, line))[1])
+    with connected() as client:
+        client.sendall(b'{"do": "list"}\n' * 40)
+        server.serve()
+        assert json.loads(client.recv(4096))["ok"]
+    assert len(parsed) == 1
 
 
 def test_more_clients_than_needed_are_disconnected(server):

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -143,3 +144,24 @@ def test_priority_is_that_of_the_process_and_of_its_session(guard, tmp_path, mon
     assert not group.exists() or group.read_text().split()[-1] == str(lower)
     process.kill()
     exit_code(process)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become an ordinary user")
+@pytest.mark.skipif(not Path("/proc/self/autogroup").exists(), reason="this kernel does not group by session")
+def test_sessions_that_an_ordinary_user_starts_at_once_all_get_their_priority():
+    code = """
+import os, subprocess
+from pathlib import Path
+from paramove.supervision.processes import prioritise
+os.setgroups([])
+os.setgid(65534)
+os.setuid(65534)
+processes = [subprocess.Popen(["sleep", "60"], stdout=subprocess.DEVNULL, start_new_session=True) for _ in range(3)]
+for process in processes:
+    prioritise(process.pid, "low")
+print(*(Path(f"/proc/{process.pid}/autogroup").read_text().split()[-1] for process in processes))
+for process in processes:
+    process.kill()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.split() == [str(NICE["low"])] * 3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import resource
 import shlex
 import shutil
@@ -19,6 +20,7 @@ from paramove.diagnosis.finding import Finding, Fix, Level, Machine, as_root
 from paramove.supervision import (
     DEFAULT_DOMAIN,
     LONGEST_FOLDER,
+    NICE,
     OPEN_FILES,
     DomainError,
     check_name,
@@ -29,6 +31,8 @@ from paramove.workspace import Workspace
 LITTLE_BYTES, FEW_BYTES = 1_000_000_000, 5_000_000_000
 """Free on a disk: less than the first is a problem, as a run of the demo records 0.5 GB and more; less than the second
 is a warning."""
+SYS_NICE = 23
+"""Number of the capability, of capability.h."""
 
 
 def resources_findings(machine: Machine) -> Iterator[Finding]:
@@ -41,6 +45,7 @@ def resources_findings(machine: Machine) -> Iterator[Finding]:
     yield sockets_finding()
     yield from disk_findings(folders)
     yield open_files_finding(resource.getrlimit(resource.RLIMIT_NOFILE)[1])
+    yield priority_finding(may_set_any_priority(), resource.getrlimit(resource.RLIMIT_NICE)[0])
     yield from environment_findings(workspace)
 
 
@@ -136,6 +141,26 @@ def open_files_finding(hard_limit: int) -> Finding:
     message = f"a process may have {hard_limit} files open, a run needs {OPEN_FILES}"
     line = f"echo '*  -  nofile  {4 * OPEN_FILES}' | {as_root('tee')} /etc/security/limits.d/paramove.conf"
     return Finding("open files", Level.PROBLEM, message, (line, "log out and in again"))
+
+
+def may_set_any_priority(status: Path = Path("/proc/self/status")) -> bool:
+    """Whether this process may give another any priority, as root may (the capability SYS_NICE)."""
+    capabilities = re.search(r"^CapEff:\s*([0-9a-f]+)$", status.read_text(encoding="utf-8"), re.MULTILINE)
+    return capabilities is not None and bool(int(capabilities[1], 16) >> SYS_NICE & 1)
+
+
+def priority_finding(may_set_any: bool, limit: int) -> Finding:
+    """Whether the launcher may give a node `priority: high`; the kernel's limit is 20 less the lowest nice value."""
+    facts = {"limit": limit}
+    if may_set_any or limit == resource.RLIM_INFINITY or limit >= 20 - NICE["high"]:
+        return Finding("priority", Level.OK, "the arm's driver may come before other programs", facts=facts)
+    message = "the arm's driver may not come before other programs: a stop takes longer while both are busy"
+    if os.geteuid() == 0:  # of a container
+        return Finding(
+            "priority", Level.WARNING, message, ("start the container with --cap-add SYS_NICE",), facts=facts
+        )
+    line = f"echo $(id -un) - nice {NICE['high']} | {as_root('tee')} /etc/security/limits.d/paramove-priority.conf"
+    return Finding("priority", Level.WARNING, message, (line, "log out and in again"), facts=facts)
 
 
 def environment_findings(workspace: Workspace) -> Iterator[Finding]:

@@ -41,6 +41,7 @@ from .messages import NodeRow as NodeRow
 from .messages import Request as Request
 from .needs import MissingFile as MissingFile
 from .needs import missing_files as missing_files
+from .processes import NICE as NICE
 from .processes import prioritise as prioritise
 from .queued_output import QueuedOutput as QueuedOutput
 from .remote_host import RemoteHost as RemoteHost

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from typing import Generic, TypeVar
 
 from paramove.documents import Message, MessageError, MessageReader
@@ -44,8 +45,11 @@ class Channel(Generic[Kind]):
         """Whether the other side has not taken all that was sent."""
         return bool(self._waiting)
 
-    def read(self) -> list[Kind | MessageError]:
-        """Messages that have come in, in order; an error for each line that is none. Blank lines are left out."""
+    def read(self) -> Iterator[Kind | MessageError]:
+        """Messages that have come in, in order; an error for each line that is none. Blank lines are left out.
+
+        Each is parsed when it is asked for: who needs the first one only does not pay for others.
+        """
         for _ in range(_MOST_PARTS):
             try:
                 part = os.read(self._reads, _PART)
@@ -58,16 +62,14 @@ class Channel(Generic[Kind]):
                 break
             self._received += part
         *lines, self._received = self._received.split(b"\n")
-        found: list[Kind | MessageError] = []
-        for line in lines:
-            if not self._skips and line.strip():
-                found.append(self._message(line))
+        if lines and self._skips:
+            del lines[0]
             self._skips = False
         if len(self._received) > self._reader.max_bytes:
             if not self._skips:
-                found.append(self._message(self._received))
+                lines.append(self._received)
             self._received, self._skips = b"", True
-        return found
+        return (self._message(line) for line in lines if line.strip())
 
     def send_line_break(self) -> None:
         """Ends a line that something else has begun on this connection, such as a shell's start-up file."""

@@ -44,9 +44,8 @@ class _Client:
 
     def is_done(self) -> bool:
         """Reads and answers as far as that needs no waiting; whether nothing is left to be done."""
-        for request in self._channel.read():
-            if self._is_answered:
-                break
+        requests = self._channel.read()
+        if not self._is_answered and (request := next(requests, None)) is not None:
             self._is_answered = True
             if isinstance(request, MessageError):
                 self._channel.send(Answer(ok=False, sentence=printable(f"no request: {request}")))
