@@ -30,6 +30,7 @@ def test_where_the_robot_is_emulated_it_arms_once() -> None:
 def test_any_other_robot_is_for_a_person_to_arm(no_program: str | None) -> None:
     arm = SmallArm()
     assert asks(arm, no_program) == (State.DISARMED, ("arming_program",))
+    assert arm.core.faults[0].joint == ""
     detail = arm.core.faults[0].detail
     assert detail.startswith("operator is a program")
     assert (no_program or Inputs.no_program) in detail

@@ -55,8 +55,9 @@ def test_a_joint_that_is_away_for_long_is_named_with_error_and_limit() -> None:
     fault = watch.fault(report(100, (0.11, -0.25, 9.0)))
     assert fault is not None
     assert (fault.code, fault.joint) == ("following", "elbow")
-    for part in ("joint elbow", "14.32 deg", "100 ms", "allowed 11.46 deg", "what blocks it, then arm again"):
+    for part in ("joint elbow", "14.32 deg", "for 100 ms", "allowed 11.46 deg"):
         assert part in fault.detail
+    assert fault.detail.endswith("; see what blocks it, then arm again")
 
 
 def test_the_time_begins_anew_once_a_joint_was_there_again() -> None:
