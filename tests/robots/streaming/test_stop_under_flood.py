@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.stop_under_flood import scene
+from benchmarks.stop_under_flood import Case, scene
 
 LIMIT_S = 1.0
 """For a busy machine; `benchmarks/stop_under_flood.py` measures. Before stops overtook, it took 4 s and more."""
@@ -14,6 +14,6 @@ LIMIT_S = 1.0
     ("robot", "kind"), [("hoap3", "invalid"), ("hoap3", "checked"), ("open_manipulator_x", "invalid")]
 )
 def test_a_stop_overtakes_a_flood_of_trajectories(robot: str, kind: str) -> None:
-    with scene(robot, kind, hosts=1) as one:
+    with scene(Case(robot, kind, hosts=1)) as one:
         stop = one.stopped(after_s=0.1)
     assert stop.played_s - stop.begun_s < LIMIT_S
