@@ -4,8 +4,12 @@ import gc
 import signal
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import pytest
+
+from tests.own_workspace import UserWorkspace
 
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # `nohup make test` ignores it, and so would the programs that tests start
 
@@ -40,3 +44,15 @@ def started():
     yield start
     for program in running:
         program.communicate()
+
+
+@pytest.fixture
+def short_folder():
+    """Outside of pytest's folders, whose names are too long for sockets."""
+    with tempfile.TemporaryDirectory(prefix="p", dir="/tmp") as folder:
+        yield Path(folder)
+
+
+@pytest.fixture
+def user_workspace(tmp_path, monkeypatch):
+    return UserWorkspace(tmp_path, monkeypatch)

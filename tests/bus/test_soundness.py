@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,14 @@ from hypothesis import strategies as st
 from paramove.bus import topics
 from paramove.bus.envelope import Reason
 from paramove.bus.publisher import ImpossibleTimeError, Publisher
-from paramove.bus.soundness import LARGEST, unsound
+from paramove.bus.soundness import LARGEST, impossible_time, unsound
 from paramove.bus.subscriber import Subscriber
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal
 from tests.bus.conftest import Wait
+from tests.own_workspace import UserWorkspace
 
 
 def _goal(**to: float) -> RelocationGoal:
@@ -102,3 +104,50 @@ def test_what_is_unsound_is_refused_counted_and_told(
     assert subscriber.counter.rejected[Reason.NUMBER] == 2
     assert subscriber.counter.lost == 0
     assert "topic gestures: message rejected (number, number 1): x is nan; finite numbers expected" in caplog.text
+
+
+def _tree(kind: Any) -> Any:
+    tree = kind(height=1.0, age=2.0, oak=3.0, leaves={"a": 1.0}, colours={"a": 1})
+    tree.branches.add().tree.branches.add().tree.height = 4.0
+    tree.nests[3].height = 5.0
+    tree.visits["a"].seconds = 6
+    return tree
+
+
+@pytest.mark.parametrize(
+    ("place", "field", "value", "found"),
+    [
+        (lambda tree: tree, "height", math.nan, "height is nan"),
+        (lambda tree: tree, "age", math.nan, "age is nan"),
+        (lambda tree: tree, "oak", math.nan, "oak is nan"),
+        (lambda tree: tree.leaves, "b", math.nan, "leaves['b'] is nan"),
+        (lambda tree: tree.nests[7].leaves, "b", math.nan, "nests[7].leaves['b'] is nan"),
+        (
+            lambda tree: tree.branches[0].tree.branches[0].tree,
+            "height",
+            math.nan,
+            "branches[0].tree.branches[0].tree.height is nan",
+        ),
+        (lambda tree: tree.colours, "a", 5, "colours['a'] is 5, which has no name"),
+        (lambda tree: tree.visits["b"], "seconds", -1, "visits['b'].seconds is -1 with 0 ns"),
+        (lambda tree: tree.where.pose.position, "x", math.nan, "where.pose.position.x is nan"),
+        (lambda tree: tree.grown, "nanos", -1, "grown.seconds is 0 with -1 ns"),
+    ],
+)
+def test_numbers_are_found_in_maps_and_in_messages_that_are_a_part_of_themselves(
+    user_workspace: UserWorkspace, place: Callable[[Any], Any], field: str, value: float, found: str
+) -> None:
+    tree = _tree(user_workspace.message("Tree"))
+    assert unsound(tree) == ""
+    changed = place(tree)
+    if hasattr(changed, "keys"):
+        changed[field] = value
+    else:
+        setattr(changed, field, value)
+    assert unsound(tree) == found
+
+
+def test_a_message_of_texts_that_is_a_part_of_itself_is_sound(user_workspace: UserWorkspace) -> None:
+    plain = user_workspace.message("Plain")(text="a", words={"a": "b"})
+    plain.next.next.text = "b"
+    assert unsound(plain) == impossible_time(plain) == ""

@@ -1,18 +1,9 @@
-"""Programs, and folders outside of pytest's, which only root may enter and whose names are too long for sockets."""
-
-import tempfile
-from pathlib import Path
+"""Programs, and a folder outside of pytest's, which only root may enter."""
 
 import pytest
 
 HOLD = "import sys; port = open(sys.argv[1], 'r+b', buffering=0); print('held', flush=True); sys.stdin.read()"
 """A program that has a device open until its input ends."""
-
-
-@pytest.fixture
-def short_folder():
-    with tempfile.TemporaryDirectory(prefix="p", dir="/tmp") as folder:
-        yield Path(folder)
 
 
 @pytest.fixture

@@ -82,3 +82,17 @@ def test_a_stop_counts_from_when_it_comes_whatever_clock_is_there(seconds):
         envelope, message = arrived(topic, request, ClockOffset())
         assert (envelope.published_ns, envelope.captured_ns) == (NOW_NS, NOW_NS)
         assert message.captured.ToNanoseconds() == NOW_NS
+
+
+def test_times_in_maps_and_in_messages_that_are_a_part_of_themselves_are_set_back(user_workspace):
+    message = user_workspace.message("Branch")()
+    message.tree.at.FromNanoseconds(NOW_NS + AHEAD_NS)
+    message.tree.visits["a"].FromNanoseconds(NOW_NS + AHEAD_NS - 1)
+    message.tree.nests[2].at.FromNanoseconds(NOW_NS + AHEAD_NS - 2)
+    message.tree.branches.add().tree.branches.add().tree.at.FromNanoseconds(NOW_NS + AHEAD_NS - 3)
+    message.tree.leaves["a"] = 1.0
+    _, moved = arrived(topics.by_name("some/topic"), message, clock())
+    tree = moved.tree
+    times = [tree.at, tree.visits["a"], tree.nests[2].at, tree.branches[0].tree.branches[0].tree.at]
+    assert [NOW_NS - time.ToNanoseconds() for time in times] == [0, 1, 2, 3]
+    assert tree.leaves == {"a": 1.0}

@@ -39,7 +39,7 @@ def type_of_hash(value: int) -> str | None:
 
     None if there is none.
     """
-    for kind in {topic.type for topic in topics.TOPICS} | {topics.status("x").type}:
+    for kind in {topic.type for topic in topics.known()} | {topics.status("x").type}:
         name = str(kind.DESCRIPTOR.full_name)
         present = GENERATIONS.get(name, 1)
         for generation in range(1, present + 10):

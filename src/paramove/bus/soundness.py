@@ -11,7 +11,9 @@ from functools import cache
 from typing import Any
 
 from google.protobuf.descriptor import Descriptor, FieldDescriptor  # type: ignore[import-untyped]
-from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto  # type: ignore[import-untyped]
+from google.protobuf.message_factory import GetMessageClass  # type: ignore[import-untyped]
+
+from paramove.bus.fields import any_field, is_map, is_repeated
 
 LARGEST = 1e12
 """Of any number; real values in SI units, pixels or counts are far smaller."""
@@ -48,18 +50,18 @@ def _checks(descriptor: Descriptor, times_only: bool) -> tuple[_Check, ...]:
     """The checks of a message type; none for a type without numbers."""
     if descriptor.full_name in _TIMES:
         return (_time,)
-    form = DescriptorProto()
-    descriptor.CopyToProto(form)  # has the labels in every release of protobuf
-    repeated = {one.name for one in form.field if one.label == FieldDescriptorProto.LABEL_REPEATED}
-    made = (_check_of(field, field.name in repeated, times_only) for field in descriptor.fields)
+    made = (_check_of(field, times_only) for field in descriptor.fields)
     return tuple(check for check in made if check is not None)
 
 
-def _check_of(field: FieldDescriptor, repeated: bool, times_only: bool) -> _Check | None:
+def _check_of(field: FieldDescriptor, times_only: bool) -> _Check | None:
     """The check of one field; None where nothing in it is to be checked."""
-    name = field.name
+    name, repeated = field.name, is_repeated(field)
+    if is_map(field):
+        value_check = _check_of(field.message_type.fields_by_name["value"], times_only)
+        return None if value_check is None else lambda message: _inside_map(field, message, value_check)
     if field.message_type is not None:
-        if not _checks(field.message_type, times_only):
+        if not _has_numbers(field.message_type, times_only):
             return None
         if repeated:
             return lambda message: _inside_many(name, getattr(message, name), times_only)
@@ -74,6 +76,27 @@ def _check_of(field: FieldDescriptor, repeated: bool, times_only: bool) -> _Chec
     if repeated:
         return lambda message: _of_many(name, getattr(message, name))
     return lambda message: _of_number(name, getattr(message, name))
+
+
+@cache
+def _has_numbers(descriptor: Descriptor, times_only: bool) -> bool:
+    """Whether a message type has something to be checked, or a part of it has."""
+
+    def is_checked(field: FieldDescriptor) -> bool:
+        if field.message_type is not None:
+            return field.message_type.full_name in _TIMES
+        return not times_only and (field.enum_type is not None or field.type in _FLOATS)
+
+    return descriptor.full_name in _TIMES or any_field(descriptor, is_checked)
+
+
+def _inside_map(field: FieldDescriptor, message: Any, value_check: _Check) -> str:
+    entry = GetMessageClass(field.message_type)
+    for key, value in getattr(message, field.name).items():
+        reason = value_check(entry(value=value))
+        if reason:
+            return f"{field.name}[{key!r}]{reason.removeprefix('value')}"
+    return ""
 
 
 def _of_number(name: str, value: float) -> str:

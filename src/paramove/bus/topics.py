@@ -1,6 +1,7 @@
 """The one table of topics: name, message type, rate, profile, frame, whether recorded.
 
-A node names its topics from here (`topics.CAMERA_IMAGE`); nothing else spells a topic name.
+A node names its topics from here (`topics.CAMERA_IMAGE`); nothing else spells a topic name. A workspace adds its own by
+a file (see `topic_table`), which are named in the same way: `lamp/state` is `topics.LAMP_STATE`.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import enum
 import re
 import warnings
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
@@ -33,6 +35,7 @@ from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
 from paramove.msgs.safety_state_pb2 import ArmRequest, LinkState, SafetyState, StopRequest
 from paramove.msgs.tracked_objects_pb2 import TrackedObjects
 from paramove.msgs.truth_pb2 import TruthArm, TruthLayout, TruthState
+from paramove.workspace import Workspace
 
 
 class Profile(enum.Enum):
@@ -137,13 +140,13 @@ class Topic:
 
 
 _LATEST, _QUEUE, _LATCHED = Profile.LATEST, Profile.QUEUE, Profile.LATCHED
-_IMAGE_BYTES = 2**24
+IMAGE_BYTES = 2**24
 _MOVEMENT_BYTES = 2**20
 
 CLOCK = Topic("clock", Clock, 15, _QUEUE)
-CAMERA_IMAGE_RAW = Topic("camera/image_raw", RawImage, 15, _LATEST, "camera_optical", max_bytes=_IMAGE_BYTES)
+CAMERA_IMAGE_RAW = Topic("camera/image_raw", RawImage, 15, _LATEST, "camera_optical", max_bytes=IMAGE_BYTES)
 CAMERA_IMAGE = Topic(
-    "camera/image", CompressedImage, 15, _LATEST, "camera_optical", recorded=True, max_bytes=_IMAGE_BYTES
+    "camera/image", CompressedImage, 15, _LATEST, "camera_optical", recorded=True, max_bytes=IMAGE_BYTES
 )
 CAMERA_IMAGES_RAW = tuple(replace(CAMERA_IMAGE_RAW, name=f"camera_{number}/image_raw") for number in range(1, 5))
 CAMERA_IMAGES = tuple(replace(CAMERA_IMAGE, name=f"camera_{number}/image") for number in range(1, 5))
@@ -197,17 +200,21 @@ WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=Tr
 TRUTH_LAYOUT = Topic("truth/layout", TruthLayout, None, _LATCHED, "world")
 TRUTH_STATE = Topic("truth/state", TruthState, 15, _QUEUE, "world")
 TRUTH_ARM = Topic("truth/arm", TruthArm, 15, _QUEUE, "table")
-TRUTH_VIEW = Topic("truth/view", RawImage, 15, _LATEST, "view", max_bytes=_IMAGE_BYTES)
+TRUTH_VIEW = Topic("truth/view", RawImage, 15, _LATEST, "view", max_bytes=IMAGE_BYTES)
 
-TOPICS: tuple[Topic, ...] = tuple(
+LIBRARY: tuple[Topic, ...] = tuple(
     topic
     for value in list(globals().values())
     for topic in (value if isinstance(value, tuple) else (value,))
     if isinstance(topic, Topic)
 )
-"""Every topic but the status topics, which exist once per node: see `status`."""
-
-RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
+"""Every topic of the library but the status topics, which exist once per node: see `status`."""
+_own_by_folder: dict[Path, tuple[Topic, ...]] = {}
+_LIBRARY_BY_NAME = {topic.name: topic for topic in LIBRARY}
+TOPICS: tuple[Topic, ...]
+"""These, and then those of the workspace that the current folder belongs to, read when they are first needed."""
+RECORDED: tuple[Topic, ...]
+"""Those of `TOPICS` that the recorder stores."""
 STEREO_IMAGES_RAW = CAMERA_IMAGES_RAW[:2]
 """Images of two cameras, for tracking an arm."""
 BY_RELAYS = (OPERATOR_ARM_AWAY, OPERATOR_STOP_AWAY, HOSTS_LINK)
@@ -221,8 +228,11 @@ ARMINGS = (OPERATOR_ARM, OPERATOR_ARM_AT_START, OPERATOR_ARM_AWAY)
 STOPS = (*PERSONS_STOPS, OPERATOR_STOP_AWAY)
 """Stops: a driver subscribes to all of them."""
 
+OWN_TABLE = "msgs/topics.yaml"
+"""File of a workspace with topics of its own; see `topic_table`."""
 _STATUS_PREFIX = "status/"
-_NAME = re.compile(r"[a-z0-9_]+(/[a-z0-9_]+)*")
+NAME = r"[a-z0-9_]+(/[a-z0-9_]+)*"
+_NAME = re.compile(NAME)
 
 
 def is_name(name: str) -> bool:
@@ -249,10 +259,38 @@ _OLD_CONSTANTS = {
 
 
 def __getattr__(name: str) -> Any:
-    """The renamed constants by their old names."""
-    if name not in _OLD_CONSTANTS:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return globals()[_now_called(f"topics.{name}", _OLD_CONSTANTS[name])]
+    """The tables with the workspace's topics, its topics by their names as constants, and renamed constants."""
+    if name == "TOPICS":
+        return LIBRARY + own()
+    if name == "RECORDED":
+        return tuple(topic for topic in LIBRARY + own() if topic.recorded)
+    if name in _OLD_CONSTANTS:
+        return globals()[_now_called(f"topics.{name}", _OLD_CONSTANTS[name])]
+    if name.isupper():
+        for topic in own():
+            if constant_of(topic.name) == name:
+                return topic
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def constant_of(name: str) -> str:
+    """How a node calls a topic of this name: `LAMP_STATE` for `lamp/state`."""
+    return name.replace("/", "_").upper()
+
+
+def own() -> tuple[Topic, ...]:
+    """Topics of the workspace that the current folder belongs to; raises as `topic_table.own_topics` does."""
+    folder = Path.cwd()
+    if folder not in _own_by_folder:
+        from paramove.bus.topic_table import own_topics
+
+        _own_by_folder[folder] = own_topics(Workspace.at(folder), _LIBRARY_BY_NAME)
+    return _own_by_folder[folder]
+
+
+def known() -> tuple[Topic, ...]:
+    """The library's topics, and the workspace's where they have been read: for messages about faults."""
+    return LIBRARY + sum(_own_by_folder.values(), ())
 
 
 def present_names(text: str) -> str:
@@ -273,7 +311,10 @@ def by_name(name: str) -> Topic:
     name = OLD_NAMES.get(name, name)
     if name.startswith(_STATUS_PREFIX):
         return status(name.removeprefix(_STATUS_PREFIX))
-    for topic in TOPICS:
+    if name in _LIBRARY_BY_NAME:
+        return _LIBRARY_BY_NAME[name]
+    for topic in own():
         if topic.name == name:
             return topic
-    raise KeyError(f"no topic {name!r} in paramove.bus.topics; {nearest(name, (topic.name for topic in TOPICS))}")
+    names = (topic.name for topic in LIBRARY + own())
+    raise KeyError(f"no topic {name!r} here; {nearest(name, names)}")

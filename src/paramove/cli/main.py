@@ -23,6 +23,7 @@ from paramove.terminal_size import drop_unusable_sizes
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("paramove.cli.demo", "Run the demonstration: `paramove launch rule_learning`."),
     "launch": ("paramove.cli.launch", "Run an application from its launch file."),
+    "new": ("paramove.cli.new", "Write an application of your own, to begin with."),
     "graph": ("paramove.cli.graph", "Draw the nodes and topics of a launch file, or of what is running."),
     "topic": ("paramove.cli.topic", "Look at topics, messages and rates on the bus."),
     "node": ("paramove.cli.node", "Look at the nodes on the bus."),

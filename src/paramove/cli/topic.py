@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from paramove.bus import inspection, topics
+from paramove.bus import inspection, is_map, topics
 from paramove.cli import completions
 from paramove.cli.bus_options import DomainOption, bus_folder, show, topic_named, with_old_keys
 from paramove.cli.output import JsonOption, ended
@@ -138,6 +138,9 @@ def _json_value(field: Any, value: Any) -> Any:
         return readable(value)
     if isinstance(value, bytes):
         return f"<{len(value)} bytes>" if len(value) > LONGEST_BYTES else value.hex()
+    if is_map(field):
+        kind = field.message_type.fields_by_name["value"]
+        return {str(key): _json_value(kind, item) for key, item in value.items()}
     if hasattr(value, "__len__") and not isinstance(value, str):
         return [_json_value(field, item) for item in value]
     if field.enum_type:

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from google.protobuf.descriptor import Descriptor, FieldDescriptor  # type: ignore[import-untyped]
 
-from paramove.bus import LATEST_NS, Envelope, Reason, RejectedError, Topic, decoded, impossible_time, topics
+from paramove.bus import (
+    LATEST_NS,
+    Envelope,
+    Reason,
+    RejectedError,
+    Topic,
+    any_field,
+    decoded,
+    impossible_time,
+    parts,
+    topics,
+)
 from paramove.hosts.clock_offset import ClockOffset
 
 LARGEST_BOUND_NS = 5_000_000
 """Where the offset of a clock is known less well, nobody can tell how old a command is."""
 _TIMESTAMP = "google.protobuf.Timestamp"
-_timed: dict[str, bool] = {}
 
 
 class UnknownTimeError(Exception):
@@ -67,21 +78,20 @@ def _earlier(time_ns: int, by_ns: int) -> int:
 
 def _set_back(message: Any, by_ns: int) -> None:
     """Every time in a message and its parts."""
+    if message.DESCRIPTOR.full_name == _TIMESTAMP:
+        message.FromNanoseconds(_earlier(message.ToNanoseconds(), by_ns))
+        return
     for field, value in message.ListFields() if _has_times(message.DESCRIPTOR) else ():
-        if field.message_type is None or not _has_times(field.message_type):
-            continue
-        for part in value if field.label == FieldDescriptor.LABEL_REPEATED else (value,):
-            if field.message_type.full_name == _TIMESTAMP:
-                part.FromNanoseconds(_earlier(part.ToNanoseconds(), by_ns))
-            else:
+        for part in parts(field, value) if field.message_type is not None else ():
+            if hasattr(part, "ListFields"):  # a map may have plain values
                 _set_back(part, by_ns)
 
 
+@cache
 def _has_times(kind: Descriptor) -> bool:
     """Whether there is a time in messages of this type, or in a part of them."""
-    name = kind.full_name
-    if name not in _timed:
-        _timed[name] = name == _TIMESTAMP  # until its parts are known: a type may be a part of itself
-        parts = [field.message_type for field in kind.fields if field.message_type is not None]
-        _timed[name] |= any(_has_times(part) for part in parts)
-    return _timed[name]
+    return any_field(kind, _is_time)
+
+
+def _is_time(field: FieldDescriptor) -> bool:
+    return field.message_type is not None and field.message_type.full_name == _TIMESTAMP

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from paramove.bus import Topic, topics
+from paramove.documents import nearest
 from paramove.supervision.environment import run_python
 from paramove.workspace import Workspace
 
@@ -132,7 +133,9 @@ def _topics(expression: ast.expr, assigned: dict[str, ast.expr], path: Path) -> 
                 return (named,)
             if isinstance(named, tuple) and all(isinstance(topic, Topic) for topic in named):
                 return named
-            raise InterfaceError(f"{path}:{expression.lineno}: there is no topic topics.{name} in paramove.bus.topics")
+            known = (topics.constant_of(topic.name) for topic in topics.TOPICS)
+            message = f"{path}:{expression.lineno}: there is no topic topics.{name}; {nearest(name, known)}"
+            raise InterfaceError(f"{message}, or add it to {topics.OWN_TABLE}")
     raise _NotPlainError
 
 
@@ -171,4 +174,7 @@ def _imported(
         last = answer.stderr.strip().splitlines()[-1:] or ["no message"]
         raise InterfaceError(f"'{module}' cannot be imported: {last[0]}")
     subscribes, publishes = json.loads(answer.stdout.splitlines()[-1])
-    return tuple(map(topics.by_name, subscribes)), tuple(map(topics.by_name, publishes))
+    try:
+        return tuple(map(topics.by_name, subscribes)), tuple(map(topics.by_name, publishes))
+    except KeyError as error:
+        raise InterfaceError(f"'{module}': {error.args[0]}, or add it to {topics.OWN_TABLE}") from error

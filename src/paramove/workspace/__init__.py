@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +18,8 @@ from paramove.workspace.trust import TRUSTED_VARIABLE, why_distrusted
 
 PARTS = ("launch", "nodes", "robot_description", "sim")
 """Folders of a workspace."""
+OWN_PARTS = (*PARTS, "msgs")
+"""Those of a user's: messages and topics of the installed one are code of the library."""
 _IN_WHEEL = Path(__file__).resolve().parent
 
 
@@ -46,7 +49,7 @@ class Workspace:
         whole = (one for one in (folder, *folder.parents) if _is_whole(one))
         left_out: list[str] = []
         for root in dict.fromkeys((*whole, folder)):
-            reason = "" if root in installed else why_distrusted(root, PARTS)
+            reason = "" if root in installed else why_distrusted(root, OWN_PARTS)
             if not reason:
                 return cls(root, tuple(dict.fromkeys((root, *installed))), tuple(left_out))
             if any((root / part).is_dir() for part in PARTS):
@@ -82,14 +85,14 @@ class Workspace:
         """Every file of the workspace by its relative path, each in the first layer that has it."""
         files: dict[str, Path] = {}
         for layer in reversed(self.layers):
-            files |= _files_of(layer)
+            files |= _files_of(layer, PARTS if layer == self.layers[-1] else OWN_PARTS)
         return dict(sorted(files.items()))
 
     def replaced(self) -> list[str]:
         """Files of nodes, launch files and simulation, and folders of robots, that replace installed ones."""
         names = set()
         for layer in self.layers[:-1]:
-            for name in _files_of(layer):
+            for name in _files_of(layer, PARTS):
                 if (self.layers[-1] / name).is_file():
                     parts = Path(name).parts
                     names.add("/".join(parts[:2]) if parts[0] == "robot_description" else name)
@@ -112,9 +115,9 @@ def _is_whole(folder: Path) -> bool:
     return (folder / "launch").is_dir() and (folder / "nodes").is_dir()
 
 
-def _files_of(layer: Path) -> dict[str, Path]:
+def _files_of(layer: Path, parts: Iterable[str]) -> dict[str, Path]:
     """Every file of one layer by its relative path."""
-    files = (file for part in PARTS for file in sorted((layer / part).rglob("*")))
+    files = (file for part in parts for file in sorted((layer / part).rglob("*")))
     return {file.relative_to(layer).as_posix(): file for file in files if file.is_file() and file.suffix != ".pyc"}
 
 

@@ -1,0 +1,119 @@
+"""An application outside the clone, with messages and topics of its own: written, run, repeated, shown, recorded."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from paramove.bus import topics
+from paramove.recording import read
+
+BIN = Path(sys.executable).parent
+PARAMOVE = BIN / "paramove"
+
+
+@pytest.fixture
+def folder(tmp_path, short_folder, monkeypatch):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(short_folder))
+    monkeypatch.setenv("PATH", f"{BIN}{os.pathsep}{os.environ['PATH']}")
+    assert paramove(tmp_path, "new", "my_robot").returncode == 0
+    monkeypatch.setattr(topics, "_own_by_folder", {})
+    monkeypatch.chdir(tmp_path / "my_robot")
+    return tmp_path / "my_robot"
+
+
+def paramove(folder, *words):
+    return subprocess.run([PARAMOVE, *words], cwd=folder, capture_output=True, text=True, timeout=180, check=False)
+
+
+def test_a_new_application_runs_the_same_every_time_and_is_recorded(folder):
+    recordings = []
+    for name in ("first", "second"):
+        run = paramove(folder, "launch", "my_robot", "--runs", name)
+        assert run.returncode == 0, run.stdout + run.stderr
+        assert "The cart is at" in run.stdout
+        recordings.append(folder / name / "latest" / "recording.mcap")
+    first, second = (list(until_the_arrival(recording)) for recording in recordings)
+    assert {topic for topic, _, _ in first} == {"cart/state", "cart/command", "speech"}
+    assert first == second
+
+
+def until_the_arrival(recording):
+    """Topic, time and bytes of the messages; how long the world lasts afterwards is for the launcher's clock to say."""
+    for one in read(recording, ["cart/state", "cart/command", "speech"]):
+        yield one.topic, one.log_ns, one.message.SerializeToString(deterministic=True)
+        if one.topic == "speech":
+            return
+
+
+def test_its_own_tests_pass(folder):
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+
+
+def test_its_topics_are_shown_with_the_others(folder):
+    graph = paramove(folder, "graph", "my_robot")
+    assert "cart/command 15 Hz  -> world" in graph.stdout
+    (folder / "msgs" / "topics.yaml").write_text("topics: {cart/state: {type: my_robot.CartSate}}\n")
+    check = paramove(folder, "launch", "my_robot", "--check")
+    assert check.returncode == 78
+    assert "msgs/topics.yaml:1:23: there is no message 'my_robot.CartSate'; did you mean 'my_robot.CartState'?" in (
+        check.stdout + check.stderr
+    )
+
+
+def test_a_node_that_names_no_topic_is_told_the_nearest(folder):
+    node = folder / "nodes" / "cart_driver.py"
+    node.write_text(node.read_text().replace("(topics.CART_STATE,)", "(topics.CART_STAT,)"))
+    check = paramove(folder, "launch", "my_robot", "--check")
+    assert check.returncode == 78
+    assert "did you mean 'CART_STATE'?" in check.stdout + check.stderr
+
+
+def test_a_topic_that_only_a_node_knows_is_reported_before_the_start(folder):
+    node = folder / "nodes" / "cart_driver.py"
+    text = node.read_text().replace(
+        "SUBSCRIBES = (topics.CART_STATE,)",
+        "from dataclasses import replace\n\nOTHER = replace(topics.CART_STATE, name='cart/other')\n"
+        "SUBSCRIBES = (topics.CART_STATE, OTHER)",
+    )
+    node.write_text(text)
+    check = paramove(folder, "launch", "my_robot", "--check")
+    answer = check.stdout + check.stderr
+    assert check.returncode == 78
+    assert "no topic 'cart/other'" in answer
+    assert "msgs/topics.yaml" in answer
+    assert "Traceback" not in answer
+
+
+def test_the_bus_shows_a_running_application(folder):
+    launch = subprocess.Popen(
+        [PARAMOVE, "launch", "my_robot", "--set", "driver.stiffness=1e-9", "--set", "world.ends_after_s=1e7"],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert launch.stdout is not None
+        for line in launch.stdout:
+            if "recording to" in line:
+                break
+        echo = paramove(folder, "topic", "echo", "cart/state", "--count", "1", "--json")
+        assert echo.returncode == 0, echo.stderr
+        assert "position_m" in json.loads(echo.stdout)["message"]
+        rows = json.loads(paramove(folder, "topic", "list", "--json").stdout)
+        (row,) = [row for row in rows if row["topic"] == "cart/state"]
+        assert row["type"] == "my_robot.CartState"
+        assert "(world)" in row["publisher"]
+    finally:
+        launch.terminate()
+        launch.communicate()
