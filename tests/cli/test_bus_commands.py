@@ -15,16 +15,19 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from paramove.bus import topics
+from paramove.bus import BusVisitor, topics
 from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
 from paramove.cli.main import COMMANDS, build
 from paramove.cli.topic import readable
+from paramove.documents import exit_codes
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
-from paramove.msgs.rule_pb2 import Rules
+from paramove.msgs.rule_pb2 import Rule, Rules
+from tests.own_workspace import UserWorkspace
 
 Run = Callable[..., Any]
+RULES = Rules(frame="table", rules=[Rule(object="blue"), Rule(object="green", x=0.5)])
 
 
 @pytest.fixture
@@ -49,7 +52,7 @@ def speaking(run: Run) -> Iterator[Path]:
     def speak() -> None:
         with Bus("recognizer", BusSettings(folder=folder), (), (topics.GESTURES, topics.RULES)) as bus:
             made.append(bus)
-            bus.publish(topics.RULES, Rules(frame="right_shoulder"))
+            bus.publish(topics.RULES, RULES)
             bus.ready("recognising\x1b[2J")
             ready.set()
             for _ in bus.events(tick=True):
@@ -104,6 +107,125 @@ def test_echo_of_a_silent_topic_ends_and_says_so(run: Run, speaking: Path) -> No
     result = run("topic", "echo", "speech", "--seconds", "0.2")
     assert result.exit_code == 1
     assert "speech: no publisher within 0.2 s" in result.output
+
+
+@pytest.mark.parametrize(
+    ("field", "printed"),
+    [("rules[0].object", "blue"), ("rules[1].x", 0.5), ("rules[7]", None), ("frame", "table")],
+)
+def test_echo_prints_a_part(run: Run, speaking: Path, field: str, printed: object) -> None:
+    result = run("topic", "echo", "rules", "--once", "--field", field)
+    assert json.loads(result.output) == printed
+
+
+def test_echo_names_the_nearest_part(run: Run, speaking: Path) -> None:
+    result = run("topic", "echo", "rules", "--once", "--field", "rules[0].objekt")
+    assert result.exit_code == 2
+    assert "did you mean 'object'?" in result.output
+
+
+def test_maps_and_messages_of_a_workspace_are_printed(user_workspace: UserWorkspace) -> None:
+    tree = user_workspace.message("Tree")(leaves={"a": 0.5}, colours={"b": 1})
+    tree.nests[3].height = 2.0
+    assert readable(tree) == {"leaves": {"a": 0.5}, "colours": {"b": "COLOUR_RED"}, "nests": {"3": {"height": 2.0}}}
+
+
+def test_type_and_interface_show_what_a_topic_carries(run: Run, user_workspace: UserWorkspace) -> None:
+    user_workspace.message("Tree")
+    assert run("topic", "type", "some/topic").output == f"{user_workspace.package}.Tree\n"
+    shown = run("interface", "show", "some/topic").output
+    assert shown == run("interface", "show", f"{user_workspace.package}.Tree").output
+    package = user_workspace.package
+    for line in (
+        f"message {package}.Tree {{",
+        f"message {package}.Branch {{",
+        f"  repeated {package}.Branch branches = 1;",
+        "  map<string, double> leaves = 4;",
+        f"  map<int32, {package}.Tree> nests = 5;",
+        f"  enum {package}.Colour {{ COLOUR_UNKNOWN = 0; COLOUR_RED = 1; }}",
+        "  foxglove.PoseInFrame where = 8;",
+        "  optional double age = 10;",
+        "  double oak = 11;  // one of kind",
+        "message foxglove.Quaternion {",
+    ):
+        assert f"{line}\n" in shown
+    wrong = run("interface", "show", f"{package}.Tre")
+    assert wrong.exit_code == 2
+    assert f"did you mean '{package}.Tree'?" in wrong.output
+    listed = run("interface", "list").output.splitlines()
+    assert {f"{package}.Tree", "paramove.msgs.Gesture", "foxglove.RawImage"} <= set(listed)
+
+
+def test_pub_publishes_once_with_a_subscriber(run: Run, speaking: Path) -> None:
+    received: list[Any] = []
+    folder = Path(os.environ["XDG_RUNTIME_DIR"]) / "paramove" / "default"
+    with BusVisitor(folder) as visitor:
+        subscriber = visitor.subscriber(topics.SPEECH)
+        end = threading.Event()
+
+        def read() -> None:
+            while not end.wait(0.01):
+                subscriber.revive()
+                while (one := subscriber.receive()) is not None:
+                    received.append(one)
+
+        reader = threading.Thread(target=read)
+        reader.start()
+        try:
+            done = run("topic", "pub", "speech", "{text: hello}", "--wait", "30")
+            again = run("topic", "pub", "speech", "{text: again}", "--rate", "50", "--count", "3", "--wait", "30")
+        finally:
+            end.set()
+            reader.join()
+    assert (done.exit_code, again.exit_code) == (0, 0), done.output + again.output
+    assert {one.message.text for one in received} == {"hello", "again"}
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (("gestures", "{object: red}"), exit_codes.TEMPORARY, "(recognizer)"),
+        (("speech", "{txt: hello}"), exit_codes.CONFIGURATION, "txt"),
+        (("speech", "hello"), exit_codes.CONFIGURATION, "as a mapping"),
+        (("speech", "{text: 3}"), exit_codes.CONFIGURATION, "paramove.msgs.Speech"),
+        (("relocation/goal", "{to: {x: 1e300}}"), exit_codes.CONFIGURATION, "to.x is 1e+300"),
+        (("speech", "{text: hello}", "--wait", "0.1"), exit_codes.FAILURE, "nobody subscribed"),
+        (("operator/arm", "{armed: true, by_person: true}"), exit_codes.USAGE, "paramove arm enable"),
+        (("operator/stop", "{}"), exit_codes.USAGE, "paramove arm stop"),
+        (("clock", "{}"), exit_codes.USAGE, "for nodes"),
+        (("truth/state", "{}"), exit_codes.USAGE, "for nodes"),
+        (("status/camera", "{}"), exit_codes.USAGE, "for nodes"),
+    ],
+)
+def test_what_pub_rejects_is_told(run: Run, speaking: Path, words: tuple[str, ...], code: int, told: str) -> None:
+    done = run("topic", "pub", *words)
+    assert (done.exit_code, told in done.output) == (code, True), done.output
+
+
+def test_node_info_shows_topics_and_the_nodes_at_them(run: Run, speaking: Path) -> None:
+    facts = json.loads(run("node", "info", "recognizer", "--json").output)
+    assert (facts["state"], facts["pid"], facts["parameters"]) == ("ready", os.getpid(), {})
+    assert {row["topic"]: row["type"] for row in facts["publishes"]}["gestures"] == "paramove.msgs.Gesture"
+    text = run("node", "info", "recognizer").output
+    assert "subscribes nothing" in text
+    assert "\x1b" not in text
+    wrong = run("node", "info", "recogniser")
+    assert wrong.exit_code == 1
+    assert "did you mean 'recognizer'?" in wrong.output
+
+
+def test_bw_and_delay_measure(run: Run, speaking: Path) -> None:
+    (width,) = json.loads(run("topic", "bw", "gestures", "--seconds", "1.5", "--json").output)
+    assert width["mean_bytes"] == width["least_bytes"] == width["most_bytes"] == 5
+    assert 20 < width["bytes_per_s"] < 120
+    (age,) = json.loads(run("topic", "delay", "gestures", "--seconds", "1.5", "--json").output)
+    assert 0.0 <= age["captured_to_published_ms"] < 1000.0
+    assert 0.0 <= age["published_to_here_ms"] < 1000.0
+
+
+def test_hz_does_not_count_the_value_from_before(run: Run, speaking: Path) -> None:
+    (rules,) = json.loads(run("topic", "hz", "rules", "--seconds", "1", "--json").output)
+    assert (rules["rate_hz"], rules["messages"], rules["state"]) == (0.0, 1, "published")
 
 
 def test_hz_measures_rate_and_size(run: Run, speaking: Path) -> None:

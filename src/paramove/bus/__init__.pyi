@@ -18,9 +18,12 @@ from .envelope import RejectedError as RejectedError
 from .envelope import pack as pack
 from .envelope import unpack as unpack
 from .exchange import Exchange as Exchange
+from .external import ExternalPublisher as ExternalPublisher
+from .external import message_of as message_of
 from .fields import any_field as any_field
 from .fields import is_map as is_map
 from .fields import parts as parts
+from .fields import written_out as written_out
 from .inspection import BusVisitor as BusVisitor
 from .inspection import publish_now as publish_now
 from .lockstep import answers_socket as answers_socket
@@ -37,6 +40,7 @@ from .node import is_first_start as is_first_start
 from .node import main as main
 from .node import publish_each as publish_each
 from .node import read_node_file as read_node_file
+from .own_messages import message_types as message_types
 from .publisher import ImpossibleTimeError as ImpossibleTimeError
 from .publisher import Publisher as Publisher
 from .recorded import RecordedBus as RecordedBus

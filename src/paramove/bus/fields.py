@@ -48,3 +48,46 @@ def any_field(descriptor: Descriptor, test: FieldTest) -> bool:
                 seen.add(field.message_type.full_name)
                 open_types.append(field.message_type)
     return False
+
+
+def written_out(descriptor: Descriptor) -> str:
+    """A message type, and those in it but Google's, as in a `.proto` file."""
+    seen = {descriptor.full_name}
+    blocks = []
+    waiting = [descriptor]
+    while waiting:
+        one = waiting.pop(0)
+        blocks.append(_block(one))
+        for field in one.fields:
+            part = field.message_type.fields_by_name["value"].message_type if is_map(field) else field.message_type
+            if part is not None and part.full_name not in seen and not part.full_name.startswith("google."):
+                seen.add(part.full_name)
+                waiting.append(part)
+    return "\n\n".join(blocks)
+
+
+def _block(descriptor: Descriptor) -> str:
+    lines = [f"message {descriptor.full_name} {{"]
+    values = [field.message_type.fields_by_name["value"] if is_map(field) else field for field in descriptor.fields]
+    enumerations = {value.enum_type.full_name: value.enum_type for value in values if value.enum_type is not None}
+    for name, enumeration in enumerations.items():
+        numbers = " ".join(f"{value.name} = {value.number};" for value in enumeration.values)
+        lines.append(f"  enum {name} {{ {numbers} }}")
+    for field in descriptor.fields:
+        choice = field.containing_oneof
+        is_optional = choice is not None and len(choice.fields) == 1 and choice.name == f"_{field.name}"
+        kind = "optional " if is_optional else "repeated " if is_repeated(field) and not is_map(field) else ""
+        of_choice = "" if choice is None or is_optional else f"  // one of {choice.name}"
+        lines.append(f"  {kind}{_type_name(field)} {field.name} = {field.number};{of_choice}")
+    return "\n".join([*lines, "}"])
+
+
+def _type_name(field: FieldDescriptor) -> str:
+    if is_map(field):
+        parts_of_entry = field.message_type.fields_by_name
+        return f"map<{_type_name(parts_of_entry['key'])}, {_type_name(parts_of_entry['value'])}>"
+    if field.message_type is not None:
+        return str(field.message_type.full_name)
+    if field.enum_type is not None:
+        return str(field.enum_type.full_name)
+    return str(FieldDescriptorProto.Type.Name(field.type)).removeprefix("TYPE_").lower()

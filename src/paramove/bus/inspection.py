@@ -6,6 +6,7 @@ Every function returns within its timeout; a publisher that is dead, busy or abs
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -23,6 +24,7 @@ from paramove.bus.subscriber import Received, Subscriber
 from paramove.bus.topics import Topic
 
 _POLL_MS = 50
+_LONGEST_DELAY_S = 60.0
 
 
 class BusVisitor(contextlib.ExitStack):
@@ -77,20 +79,24 @@ class PublisherOnBus:
 
 @dataclass
 class Measurement:
-    """Messages of a topic received within some seconds. Times are of this process's monotonic clock.
+    """Messages of a topic received within some seconds.
+
+    A latched value that was published before is no message of this time: it counts in `counter` only.
 
     Attributes:
         topic: Row of the table.
-        counter: Of the messages, losses and rejected messages; a latched value that was published before counts, too.
-            Its epoch is None if no publisher answered.
-        bytes_total: Of the payloads.
-        arrivals_s: When messages arrived.
+        counter: Of the messages, losses and rejected messages. Its epoch is None if no publisher answered.
+        arrivals_s: When messages arrived, by this process's monotonic clock.
+        sizes: Of their payloads, bytes.
+        published_s, captured_s: By the clock of the run, which may be simulated.
     """
 
     topic: Topic
     counter: SequenceCounter
-    bytes_total: int = 0
     arrivals_s: list[float] = field(default_factory=list)
+    sizes: list[int] = field(default_factory=list)
+    published_s: list[float] = field(default_factory=list)
+    captured_s: list[float] = field(default_factory=list)
 
     @property
     def rate_hz(self) -> float:
@@ -100,6 +106,11 @@ class Measurement:
         return (len(self.arrivals_s) - 1) / (self.arrivals_s[-1] - self.arrivals_s[0])
 
     @property
+    def bytes_per_s(self) -> float:
+        """Of payloads, between the first and the last arrival; 0 with fewer than two."""
+        return self.rate_hz * self.mean_bytes
+
+    @property
     def longest_gap_s(self) -> float:
         """Longest time between two messages."""
         return max((b - a for a, b in zip(self.arrivals_s, self.arrivals_s[1:], strict=False)), default=0.0)
@@ -107,7 +118,18 @@ class Measurement:
     @property
     def mean_bytes(self) -> float:
         """Mean size of a payload."""
-        return self.bytes_total / self.counter.messages if self.counter.messages else 0.0
+        return sum(self.sizes) / len(self.sizes) if self.sizes else 0.0
+
+    @property
+    def waits_s(self) -> list[float]:
+        """From when each message's content was captured until it was published."""
+        return [after - before for before, after in zip(self.captured_s, self.published_s, strict=True)]
+
+    @property
+    def delays_s(self) -> list[float]:
+        """From when each message was published until it arrived; empty where the run has another clock than this."""
+        delays = [after - before for before, after in zip(self.published_s, self.arrivals_s, strict=True)]
+        return delays if all(-0.01 < delay < _LONGEST_DELAY_S for delay in delays) else []
 
 
 def publishers(folder: Path) -> list[PublisherOnBus]:
@@ -122,7 +144,7 @@ def publisher_of(folder: Path, topic: Topic) -> PublisherOnBus:
     return PublisherOnBus(topic, is_held(path), holder_of(path))
 
 
-def listen(folder: Path, selected: Sequence[Topic], seconds: float) -> Iterator[Received]:
+def listen(folder: Path, selected: Sequence[Topic], seconds: float = math.inf) -> Iterator[Received]:
     """Messages of the topics, decoded, as they arrive within `seconds`."""
     end_s = time.monotonic() + seconds
     with BusVisitor(folder) as visitor:
@@ -143,8 +165,12 @@ def measure(folder: Path, selected: Sequence[Topic], seconds: float) -> list[Mea
         while time.monotonic() < end_s:
             for subscriber, measurement in zip(subscribers, measurements, strict=True):
                 while (raw := subscriber.receive_raw()) is not None:
-                    measurement.arrivals_s.append(time.monotonic())
-                    measurement.bytes_total += len(raw[1])
+                    envelope, payload = raw
+                    if not envelope.is_welcome:
+                        measurement.arrivals_s.append(time.monotonic())
+                        measurement.sizes.append(len(payload))
+                        measurement.published_s.append(1e-9 * envelope.published_ns)
+                        measurement.captured_s.append(1e-9 * envelope.captured_ns)
             _poll(subscribers, end_s)
     return measurements
 
@@ -167,4 +193,4 @@ def _poll(subscribers: list[Subscriber], end_s: float) -> None:
     for subscriber in subscribers:
         subscriber.revive()
         poller.register(subscriber.socket, zmq.POLLIN)
-    poller.poll(max(0, min(_POLL_MS, int(1000 * (end_s - time.monotonic())))))
+    poller.poll(int(max(0.0, min(_POLL_MS, 1000 * (end_s - time.monotonic())))))

@@ -24,7 +24,8 @@ from typing import Any
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory  # type: ignore[import-untyped]
 from platformdirs import user_cache_path
 
-from paramove.documents import DocumentError, InputError, Position, nearest, raise_any, read_text, replacing
+from paramove.documents import DocumentError, InputError, Position, raise_any, read_text, replacing
+from paramove.workspace import Workspace
 
 FOLDER = "msgs"
 _LIBRARIES = {
@@ -37,25 +38,26 @@ _TIMEOUT_S = 60.0
 _PROTOC_LINE = re.compile(r"(?P<file>[^:\n]+\.proto):(?:(?P<line>\d+):(?P<column>\d+):)? ?(?P<message>.+)")
 
 
-class MessageTypes:
-    """Message types by their full protobuf names, such as `my_robot.Lamp`.
+def own_messages(root: Path) -> dict[str, type[Any]]:
+    """Message types of a workspace by their full names, such as `my_robot.Lamp`.
 
     Args:
-        root: Folder of a workspace.
+        root: Folder of the workspace.
 
     Raises DocumentError with file, line and column of what protoc rejects; InputError if it cannot run.
     """
+    return _load(_compiled(root)) if _sources(root) else {}
 
-    def __init__(self, root: Path) -> None:
-        self._own = _load(_compiled(root)) if _sources(root) else {}
 
-    def find(self, name: str) -> type[Any] | None:
-        """A type of the workspace or of a library; None if there is none."""
-        return self._own.get(name) or _library_types().get(name)
+def message_types() -> dict[str, type[Any]]:
+    """All types by their full names: those of the workspace of the current folder, paramove's, Foxglove's, Google's.
 
-    def suggestion(self, name: str) -> str:
-        """The nearest names, for a message about a wrong one."""
-        return nearest(name, [*self._own, *_library_types()])
+    Raises as `own_messages` does.
+    """
+    found = dict(library_messages())
+    for layer in Workspace.here().layers:
+        found |= own_messages(layer)
+    return found
 
 
 def _sources(root: Path) -> list[Path]:
@@ -168,7 +170,8 @@ def _library_modules() -> tuple[Any, ...]:
 
 
 @functools.cache
-def _library_types() -> dict[str, type[Any]]:
+def library_messages() -> dict[str, type[Any]]:
+    """Types of messages of paramove, Foxglove and Google by their full names."""
     found = {}
     for module in _library_modules():
         for message in module.DESCRIPTOR.message_types_by_name.values():

@@ -14,9 +14,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from paramove.bus.own_messages import MessageTypes
+from paramove.bus.own_messages import library_messages, own_messages
 from paramove.bus.topics import IMAGE_BYTES, NAME, OWN_TABLE, Profile, Topic
-from paramove.documents import checked, raise_any, read_document
+from paramove.documents import checked, nearest, raise_any, read_document
 from paramove.workspace import Workspace
 
 RESERVED = ("status/",)
@@ -74,15 +74,17 @@ def _topics_of(layer: Path, library: Mapping[str, Topic]) -> list[Topic]:
     """Topics of the table in one folder."""
     document = read_document(layer / OWN_TABLE, "table of topics")
     table = checked(TopicTable, document, {"": "parts of lower-case letters, digits and '_', joined by '/'"})
-    types = MessageTypes(layer)
+    types = own_messages(layer)
+    if any(row.type not in types for row in table.topics.values()):
+        types = library_messages() | types
     found, faults = [], []
     for name, row in table.topics.items():
-        message = types.find(row.type)
+        message = types.get(row.type)
         fault = _fault(name, row, library)
         if fault:
             faults.append(document.error(("topics", name), fault))
         if message is None:
-            fault = f"there is no message '{row.type}'; {types.suggestion(row.type)}"
+            fault = f"there is no message '{row.type}'; {nearest(row.type, types)}"
             faults.append(document.error(("topics", name, "type"), fault))
         else:
             found.append(_topic(name, row, message))

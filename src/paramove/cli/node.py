@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import psutil
 import typer
 
-from paramove.bus import inspection
+from paramove.bus import inspection, topics
 from paramove.cli import completions
 from paramove.cli.bus_options import DomainOption, bus_folder, show
 from paramove.cli.output import JsonOption, ended
-from paramove.documents import exit_codes, nearest
-from paramove.msgs.node_status_pb2 import NodeStatus
+from paramove.documents import InputError, exit_codes, nearest, printable, read_document
+from paramove.msgs.node_status_pb2 import NodeStatus, TopicCount
 from paramove.supervision import NodeRow, NoRunError, Request, ask
 
 app = typer.Typer(name="node", help="Look at the nodes on the bus; stop, start or restart one.", no_args_is_help=True)
@@ -41,6 +45,79 @@ def list_nodes(
     if not rows and not as_json:
         typer.echo("no node is on the bus")
     show(rows, as_json)
+
+
+@app.command()
+def info(
+    name: NameArgument,
+    domain: DomainOption = None,
+    as_json: JsonOption = False,
+    seconds: Annotated[float, typer.Option(min=0.1, help="how long to wait for an answer")] = 2.0,
+) -> None:
+    """Show one node: state, process, its topics with the other nodes at them, and its parameters.
+
+    Parameters are those that the launch file gave, on this host; others have their defaults.
+
+    Exit codes: 0 done; 1 nothing runs, or there is no such node.
+    """
+    statuses = inspection.statuses(bus_folder(domain), seconds)
+    if name not in statuses:
+        raise ended(f"there is no node '{name}'; {nearest(name, statuses)}", exit_codes.FAILURE)
+    status = statuses[name]
+    if status is None:
+        raise ended(f"{name} is alive, but did not answer within {seconds:g} s", exit_codes.FAILURE)
+    others = {node: other for node, other in statuses.items() if other is not None and node != name}
+    facts: dict[str, Any] = {
+        "node": name,
+        "state": _state_of(status),
+        "sentence": status.detail,
+        "pid": status.pid,
+        "subscribes": [
+            _topic_of_node(count, [node for node, other in others.items() if _has(other.published, count.topic)])
+            for count in status.received
+        ],
+        "publishes": [
+            _topic_of_node(count, [node for node, other in others.items() if _has(other.received, count.topic)])
+            for count in status.published
+        ],
+        "parameters": _parameters_of(status.pid),
+    }
+    if as_json:
+        typer.echo(json.dumps(facts, indent=2))
+        return
+    typer.echo(f"{name}: {facts['state']}, pid {status.pid}, {printable(status.detail)}")
+    for what in ("subscribes", "publishes"):
+        typer.echo(f"{what}:" if facts[what] else f"{what} nothing")
+        show([row | {"with": ", ".join(row["with"])} for row in facts[what]], as_json=False)
+    typer.echo("parameters:" if facts["parameters"] else "parameters: defaults")
+    for key, value in facts["parameters"].items():
+        typer.echo(f"  {key}: {json.dumps(value)}")
+
+
+def _topic_of_node(count: TopicCount, nodes: list[str]) -> dict[str, Any]:
+    try:
+        kind = topics.by_name(count.topic).type_name
+    except KeyError:  # remapped, or of another workspace
+        kind = ""
+    return {"topic": count.topic, "type": kind, "messages": count.messages, "lost": count.lost, "with": nodes}
+
+
+def _has(counts: Iterable[TopicCount], topic: str) -> bool:
+    return any(count.topic == topic for count in counts)
+
+
+def _state_of(status: NodeStatus) -> str:
+    return str(NodeStatus.State.Name(status.state)).removeprefix("STATE_").lower()
+
+
+def _parameters_of(pid: int) -> dict[str, Any]:
+    """Of the configuration with which a node on this host was started; {} if that cannot be read."""
+    with contextlib.suppress(psutil.Error, InputError, ValueError):
+        words = psutil.Process(pid).cmdline()
+        file = read_document(Path(words[words.index("--config") + 1]), "configuration of a node")
+        parameters: dict[str, Any] = file.data.get("parameters", {})
+        return parameters
+    return {}
 
 
 @app.command()
@@ -108,7 +185,7 @@ def _row(
     """A line of the list, from the node's status and its supervisor."""
     if status is None:
         status = NodeStatus(detail=f"alive, did not answer within {seconds:g} s" if alive else "")
-    state = NodeStatus.State.Name(status.state).removeprefix("STATE_").lower() if status.state else "busy"
+    state = _state_of(status) if status.state else "busy"
     return {
         "node": node,
         "state": supervised.state if supervised else state,

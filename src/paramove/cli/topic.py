@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import json
 import math
+import re
+from statistics import median
 from typing import Annotated, Any
 
 import typer
 
-from paramove.bus import inspection, is_map, topics
+from paramove.bus import ExternalPublisher, Received, TopicTakenError, inspection, is_map, message_of, topics
 from paramove.cli import completions
 from paramove.cli.bus_options import DomainOption, bus_folder, show, topic_named, with_old_keys
-from paramove.cli.output import JsonOption, ended
-from paramove.documents import exit_codes
+from paramove.cli.output import JsonOption, ended, one_line
+from paramove.documents import exit_codes, nearest
 
 app = typer.Typer(name="topic", help="Look at topics, messages and rates on the bus.", no_args_is_help=True)
 
 NameArgument = Annotated[
     str, typer.Argument(help="name of the topic, such as camera/image", autocompletion=completions.topics)
 ]
+NamesArgument = Annotated[
+    list[str] | None,
+    typer.Argument(help="topics; default: all with a publisher", autocompletion=completions.topics),
+]
+SecondsOption = Annotated[float, typer.Option(min=0.1, help="how long to listen")]
+PATH_PART = re.compile(r"(?:^|\.)([A-Za-z_]\w*)|\[([^\]]*)\]")
 LONGEST_BYTES = 32
 """Longer byte fields are shown by their length."""
 
@@ -65,52 +75,129 @@ def info(name: NameArgument, domain: DomainOption = None, as_json: JsonOption = 
         show([{"": key, " ": value} for key, value in row.items()], as_json=False)
 
 
+@app.command("type")
+def type_of(name: NameArgument) -> None:
+    """Print the type of a topic's messages; `paramove interface show TYPE` prints their fields."""
+    typer.echo(topic_named(name).type_name)
+
+
 @app.command()
 def echo(
     name: NameArgument,
     domain: DomainOption = None,
     as_json: JsonOption = False,
-    count: Annotated[int, typer.Option(min=1, help="end after so many messages")] = 10,
-    seconds: Annotated[float, typer.Option(min=0.1, help="end after so long")] = 10.0,
+    count: Annotated[int | None, typer.Option(min=1, help="end after so many messages; default: never")] = None,
+    once: Annotated[bool, typer.Option("--once", help="end after one message")] = False,
+    field: Annotated[
+        str, typer.Option(metavar="PATH", help="only a part of each message, such as joints[0].position")
+    ] = "",
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="end after so long; default: never")] = None,
 ) -> None:
-    """Print messages as they arrive: one per block, or with --json one JSON object per line."""
+    """Print messages as they arrive, until Ctrl-C: one per block, or with --json one JSON object per line.
+
+    Exit codes: 0 done; 1 nothing arrived within --seconds, or nothing runs; 2 there is no such topic or part.
+    """
     folder, topic = bus_folder(domain), topic_named(name)
+    most = 1 if once else count
     messages = 0
-    for received in inspection.listen(folder, [topic], seconds):
-        messages += 1
-        content = readable(received.message)
+    if not inspection.publisher_of(folder, topic).alive:
+        typer.echo(f"{topic.name} has no publisher yet; waits for one", err=True)
+    with contextlib.suppress(KeyboardInterrupt):
+        for received in inspection.listen(folder, [topic], math.inf if seconds is None else seconds):
+            messages += 1
+            content = _part(received.message, field) if field else readable(received.message)
+            _print_message(received, content, as_json, is_part=bool(field))
+            if messages == most:
+                return
+        if messages == 0:
+            state = inspection.publisher_of(folder, topic)
+            reason = f"{state.holder} published nothing" if state.alive else "no publisher"
+            raise ended(f"{topic.name}: {reason} within {seconds:g} s", exit_codes.FAILURE)
+
+
+def _print_message(received: Received, content: Any, as_json: bool, is_part: bool) -> None:
+    if as_json:
         head = {
             "sequence": received.sequence,
             "captured_ns": received.captured_ns,
             "published_ns": received.published_ns,
         }
-        if as_json:
-            typer.echo(json.dumps(head | {"message": content}))
+        typer.echo(json.dumps(head | {"message": content}))
+        return
+    if not is_part:
+        captured_s = 1e-9 * received.captured_ns
+        typer.echo(f"--- {received.topic.name} {received.sequence}, captured at {captured_s:.3f} s")
+    typer.echo(json.dumps(content, indent=2, ensure_ascii=True))
+
+
+def _part(message: Any, path: str) -> Any:
+    """The part of a message at a path such as `joints[0].position`; None where a list or map has no such item."""
+    value: Any = message
+    field: Any = None
+    for name, index in PATH_PART.findall(path):
+        if name:
+            field = value.DESCRIPTOR.fields_by_name.get(name) if hasattr(value, "DESCRIPTOR") else None
+            if field is None:
+                known = value.DESCRIPTOR.fields_by_name if hasattr(value, "DESCRIPTOR") else ()
+                raise ended(f"there is no part '{name}' in '{path}'; {nearest(name, known)}", exit_codes.USAGE)
+            value = getattr(value, name)
+        elif index.isdecimal() and int(index) < len(value) and not is_map(field):
+            value = value[int(index)]
+        elif is_map(field) and index in {str(key) for key in value}:
+            value = next(item for key, item in value.items() if str(key) == index)
+            field = field.message_type.fields_by_name["value"]
         else:
-            typer.echo(f"--- {topic.name} {received.sequence}, captured at {received.captured_ns * 1e-9:.3f} s")
-            typer.echo(json.dumps(content, indent=2, ensure_ascii=True))
-        if messages == count:
-            return
-    if messages == 0:
-        state = inspection.publisher_of(folder, topic)
-        reason = f"{state.holder} published nothing" if state.alive else "no publisher"
-        raise ended(f"{topic.name}: {reason} within {seconds:g} s", exit_codes.FAILURE)
+            return None
+    return _json_value(field, value)
+
+
+@app.command()
+def pub(
+    name: NameArgument,
+    content: Annotated[str, typer.Argument(help="the message in YAML, such as '{position_m: 0.5}'")] = "{}",
+    domain: DomainOption = None,
+    rate_hz: Annotated[
+        float | None, typer.Option("--rate", min=0.01, max=1000.0, help="again and again, until Ctrl-C")
+    ] = None,
+    count: Annotated[int | None, typer.Option(min=1, help="with --rate: end after so many")] = None,
+    wait_s: Annotated[float, typer.Option("--wait", min=0.0, metavar="SECONDS", help="for a first subscriber")] = 2.0,
+) -> None:
+    """Publish a message, once or at a rate, on a topic that nobody else publishes.
+
+    The time of the message is that of the run. Nobody arms an arm so: `paramove arm enable` asks a person.
+
+    Exit codes: 0 published; 1 nothing runs, or nobody subscribes; 2 there is no such topic, or it is for nodes or
+    persons; 75 a node publishes it; 78 that is no message of the topic.
+    """
+    folder, topic = bus_folder(domain), topic_named(name)
+    if topic.truth or topic.is_request or topic in (topics.CLOCK, topics.HOSTS_LINK) or name.startswith("status/"):
+        whose = "persons: paramove arm enable, paramove arm stop" if topic.is_request else "nodes of the run"
+        raise ended(f"{topic.name} is for {whose}", exit_codes.USAGE)
+    with one_line():
+        message = message_of(topic.type, content)
+    try:
+        with ExternalPublisher(folder, topic, "paramove topic pub") as publisher:
+            subscribers = publisher.wait_for_subscriber(wait_s)
+            for number in itertools.count(1):
+                publisher.publish(message)
+                if rate_hz is None or number == count:
+                    break
+                publisher.idle(1 / rate_hz)
+    except KeyboardInterrupt:
+        return
+    except TopicTakenError as error:
+        raise ended(f"{error}; a topic has one publisher: paramove node stop NAME", exit_codes.TEMPORARY) from error
+    except ValueError as error:
+        raise ended(str(error), exit_codes.CONFIGURATION) from error
+    if not subscribers:
+        raise ended(f"{topic.name}: published, but nobody subscribed within {wait_s:g} s", exit_codes.FAILURE)
 
 
 @app.command()
 def hz(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(help="topics; default: all with a publisher", autocompletion=completions.topics),
-    ] = None,
-    domain: DomainOption = None,
-    as_json: JsonOption = False,
-    seconds: Annotated[float, typer.Option(min=0.1, help="how long to listen")] = 3.0,
+    names: NamesArgument = None, domain: DomainOption = None, as_json: JsonOption = False, seconds: SecondsOption = 3.0
 ) -> None:
     """Measure rates, losses, the longest gap and sizes. Reads envelopes only."""
-    folder = bus_folder(domain)
-    alive = {item.topic.name for item in inspection.publishers(folder) if item.alive}
-    requested = [topic_named(name) for name in names] if names else [topics.by_name(name) for name in sorted(alive)]
     rows = [
         {
             "topic": item.topic.name,
@@ -121,11 +208,64 @@ def hz(
             "refused": item.counter.rejected.total(),
             "longest_gap_s": round(item.longest_gap_s, 4),
             "mean_bytes": round(item.mean_bytes),
-            "state": _state(item.topic.name in alive, item.counter.epoch is not None),
+            "state": _state(alive, item.counter.epoch is not None),
         }
-        for item in inspection.measure(folder, requested, seconds)
+        for item, alive in _measured(names, domain, seconds)
     ]
     show(rows, as_json)
+
+
+@app.command()
+def bw(
+    names: NamesArgument = None, domain: DomainOption = None, as_json: JsonOption = False, seconds: SecondsOption = 3.0
+) -> None:
+    """Measure the bandwidth of topics: bytes a second, and sizes of messages. Reads envelopes only."""
+    rows = [
+        {
+            "topic": item.topic.name,
+            "bytes_per_s": round(item.bytes_per_s),
+            "messages": len(item.sizes),
+            "mean_bytes": round(item.mean_bytes),
+            "least_bytes": min(item.sizes, default=0),
+            "most_bytes": max(item.sizes, default=0),
+        }
+        for item, _ in _measured(names, domain, seconds)
+    ]
+    show(rows, as_json)
+
+
+@app.command()
+def delay(
+    names: NamesArgument = None, domain: DomainOption = None, as_json: JsonOption = False, seconds: SecondsOption = 3.0
+) -> None:
+    """Measure how old messages are: from capture to publication, and from there to this command.
+
+    In simulated time only the first is known.
+    """
+    rows = [
+        {
+            "topic": item.topic.name,
+            "messages": len(item.arrivals_s),
+            **_times("captured_to_published", item.waits_s),
+            **_times("published_to_here", item.delays_s),
+        }
+        for item, _ in _measured(names, domain, seconds)
+    ]
+    show(rows, as_json)
+
+
+def _times(what: str, times_s: list[float]) -> dict[str, float | None]:
+    if not times_s:
+        return {f"{what}_ms": None, f"{what}_max_ms": None}
+    return {f"{what}_ms": round(1e3 * median(times_s), 2), f"{what}_max_ms": round(1e3 * max(times_s), 2)}
+
+
+def _measured(names: list[str] | None, domain: str | None, seconds: float) -> list[tuple[inspection.Measurement, bool]]:
+    """Measurements of topics, by default of all with a publisher, and whether each has one."""
+    folder = bus_folder(domain)
+    alive = {item.topic.name for item in inspection.publishers(folder) if item.alive}
+    requested = [topic_named(name) for name in names] if names else [topics.by_name(name) for name in sorted(alive)]
+    return [(item, item.topic.name in alive) for item in inspection.measure(folder, requested, seconds)]
 
 
 def readable(message: Any) -> dict[str, Any]:
