@@ -16,10 +16,8 @@ from paramove.bus.endpoint import Ownership, socket_path
 from paramove.bus.settings import BusSettings, lock_of
 from paramove.robots import this_launch
 from paramove.robots.this_launch import RESTARTED, ThisLaunch
-from tests.diagnosis.conftest import HOLD, short_folder
+from tests.diagnosis.conftest import HOLD
 from tests.robots.one_process import HERE
-
-__all__ = ["short_folder"]
 
 LAUNCH = ThisLaunch(os.getpid())
 ELSEWHERE = ThisLaunch(2**22)  # no process has this id
