@@ -70,7 +70,7 @@ def run(copy, program, *, interpreted=False):
     return done.stdout, done.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_kernel_has_no_old_machine_code_of_another_one(copy):
     old, said = run(copy, LIKELIHOOD)
     assert said.count("compiling") == 1

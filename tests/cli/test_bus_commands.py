@@ -190,11 +190,11 @@ def test_pub_publishes_once_with_a_subscriber(run: Run, speaking: Path) -> None:
         (("speech", "{text: 3}"), exit_codes.CONFIGURATION, "paramove.msgs.Speech"),
         (("relocation/goal", "{to: {x: 1e300}}"), exit_codes.CONFIGURATION, "to.x is 1e+300"),
         (("speech", "{text: hello}", "--wait", "0.1"), exit_codes.FAILURE, "nobody subscribed"),
-        (("operator/arm", "{armed: true, by_person: true}"), exit_codes.USAGE, "paramove arm enable"),
-        (("operator/stop", "{}"), exit_codes.USAGE, "paramove arm stop"),
-        (("clock", "{}"), exit_codes.USAGE, "for nodes"),
-        (("truth/state", "{}"), exit_codes.USAGE, "for nodes"),
-        (("status/camera", "{}"), exit_codes.USAGE, "for nodes"),
+        (("operator/arm", "{armed: true, by_person: true}"), exit_codes.CONFIGURATION, "paramove arm enable"),
+        (("operator/stop", "{}"), exit_codes.CONFIGURATION, "paramove arm stop"),
+        (("clock", "{}"), exit_codes.CONFIGURATION, "for nodes"),
+        (("truth/state", "{}"), exit_codes.CONFIGURATION, "for nodes"),
+        (("status/camera", "{}"), exit_codes.CONFIGURATION, "for nodes"),
     ],
 )
 def test_what_pub_rejects_is_told(run: Run, speaking: Path, words: tuple[str, ...], code: int, told: str) -> None:

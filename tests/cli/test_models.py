@@ -61,6 +61,7 @@ def test_show(trained):
     assert facts["left_out"] is None
 
 
+@pytest.mark.long
 def test_show_tells_what_was_left_out_of_this_very_file(trained, tmp_path):
     file = tmp_path / "a.npz"
     quick = ("--states", 10, "--frames", 50)

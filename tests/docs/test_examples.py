@@ -10,9 +10,14 @@ from tests.docs.test_commands import ENVIRONMENT
 
 MARKER = "in the example"
 EXAMPLES = [path for path in PAGES if files(path) or any(block.marker == MARKER for block in blocks(path))]
+LONG = ("train_and_recognize", "from_motion_capture")
+"""Pages whose commands train for minutes."""
 
 
-@pytest.fixture(scope="module", params=EXAMPLES, ids=lambda path: path.stem)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(path, marks=pytest.mark.long if path.stem in LONG else (), id=path.stem) for path in EXAMPLES],
+)
 def example(request, tmp_path_factory):
     """A page, and a workspace with its files beside those of the project."""
     root = tmp_path_factory.mktemp("workspace")

@@ -51,6 +51,7 @@ def test_the_first_model_recognises_and_rejects(tmp_path: Path) -> None:
     assert names["genuine"] > 0.01 > names["other"]
 
 
+@pytest.mark.long
 def test_the_honest_model_is_honest(tmp_path: Path) -> None:
     names, pictures = drawn(FOLDER / "is_my_model_honest.ipynb", tmp_path)
     assert len(pictures) == 3

@@ -82,6 +82,7 @@ def test_a_file_that_was_cut_off_is_compiled_again(folder):
     assert ended(started(folder, "1")) == (["10"], 0)
 
 
+@pytest.mark.long
 def test_where_the_code_lies_read_only_the_users_cache_has_the_machine_code(folder):
     (folder / "__pycache__").write_text("no folder can be made here")
     assert ended(started(folder, "1")) == (["10"], 1)
@@ -89,6 +90,7 @@ def test_where_the_code_lies_read_only_the_users_cache_has_the_machine_code(fold
     assert list((folder / "cache").rglob("kernel_file.*.nbc"))
 
 
+@pytest.mark.long
 def test_where_nothing_can_be_written_kernels_are_compiled_without_being_stored(folder):
     """A user without home in a container; root may write everywhere, so that files stand where folders would be."""
     (folder / "__pycache__").write_text("no folder can be made here")
@@ -104,6 +106,7 @@ def test_where_nothing_can_be_written_kernels_are_compiled_without_being_stored(
     assert not list(folder.rglob("*.nbc"))
 
 
+@pytest.mark.long
 def test_a_process_whose_code_was_edited_meanwhile_leaves_nothing_to_others(folder):
     """It may have imported either."""
     edited = "import paramove.source_code, pathlib; file = pathlib.Path('kernel_file.py'); "

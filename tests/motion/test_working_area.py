@@ -46,7 +46,7 @@ def can_be_fetched_and_put(place: tuple[float, float]) -> bool:
     return True
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_working_area_is_about_twenty_by_seven_centimetres(capsys: pytest.CaptureFixture[str]) -> None:
     usable = np.array([[can_be_fetched_and_put((x, y)) for y in Y] for x in X])
     shown = [

@@ -82,8 +82,8 @@ def hoap3() -> RobotDescription:
     ("seed", "elevation_deg", "diameter_mm", "chamfer_mm"),
     [
         (0, 35, 25, 2),
-        (1, 35, 34, 8),
-        (3, 52, 28, 6),
+        pytest.param(1, 35, 34, 8, marks=pytest.mark.long),
+        pytest.param(3, 52, 28, 6, marks=pytest.mark.long),
         (6, 65, 25, 2),
         (7, 65, 34, 8),
     ],

@@ -120,6 +120,7 @@ def test_the_overlay_knows_where_the_table_frame_is() -> None:
     assert_allclose(turn_of_table() @ turn_of_table().T, np.eye(3), rtol=0, atol=1e-12)
 
 
+@pytest.mark.long
 def test_a_tracker_tells_the_object_that_is_pointed_at() -> None:
     """From what people measure beforehand and from images alone."""
     simulation = simulated("rule_learning_whole_arm", 11, camera=True)

@@ -167,3 +167,31 @@ def test_parameters_that_were_right_are_not_checked_again_until_the_code_changes
     monkeypatch.setattr(parameters, "code_digest", lambda *modules: "of changed code")
     application.check(launch, installed)
     assert len(asked) == 3
+
+
+def reader_of_goals(workspace, also=""):
+    (workspace.root / "nodes" / "goal_reader.py").write_text(
+        "from paramove.bus import topics\n"
+        f"SUBSCRIBES = (topics.RELOCATION_GOAL, {also})\nPUBLISHES = (topics.SPEECH,)\n"
+    )
+
+
+def test_a_topic_from_outside_needs_no_publisher(workspace):
+    reader_of_goals(workspace)
+    checked(workspace, "external: [relocation/goal]\nnodes: {main: {module: nodes.goal_reader}}")
+
+
+@pytest.mark.parametrize(
+    ("external", "told"),
+    [
+        ("speech", "'main' publishes speech"),
+        ("relocation/gaol", "did you mean 'relocation/goal'?"),
+        ("operator/stop", "for nodes and persons"),
+        ("truth/state", "for nodes and persons"),
+    ],
+)
+def test_a_topic_that_nobody_may_or_needs_to_publish_from_outside_is_told(workspace, external, told):
+    reader_of_goals(workspace, "topics.OPERATOR_STOP, topics.TRUTH_STATE")
+    with pytest.raises(DocumentError) as raised:
+        checked(workspace, f"external: [{external}]\nnodes: {{main: {{module: nodes.goal_reader, truth: true}}}}")
+    assert told in next(finding.message for finding in raised.value if finding.position.line == 1)

@@ -34,6 +34,7 @@ def test_targets_that_a_person_points_at_are_found_and_tracked_again_without_tru
     assert (again / "recording.mcap").stat().st_size > 100_000
 
 
+@pytest.mark.long
 def test_a_stereo_body_tracker_and_a_window_of_its_poses_find_the_target_too(launcher):
     """Paper 5.4: markers instead of silhouettes, the last part of pointing instead of a filter."""
     arguments = ("--with", "sim", "--with", "stereo", "--seed", "9", "--set", "simulator.targets=1")

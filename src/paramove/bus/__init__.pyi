@@ -18,8 +18,6 @@ from .envelope import RejectedError as RejectedError
 from .envelope import pack as pack
 from .envelope import unpack as unpack
 from .exchange import Exchange as Exchange
-from .external import ExternalPublisher as ExternalPublisher
-from .external import message_of as message_of
 from .fields import any_field as any_field
 from .fields import is_map as is_map
 from .fields import parts as parts

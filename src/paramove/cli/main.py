@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "new": ("paramove.cli.new", "Write an application of your own, to begin with."),
     "graph": ("paramove.cli.graph", "Draw the nodes and topics of a launch file, or of what is running."),
     "topic": ("paramove.cli.topic", "Look at topics, messages and rates on the bus."),
+    "goal": ("paramove.cli.goal", "Send the robot of a running application a goal."),
     "interface": ("paramove.cli.interface", "Look at the types of messages."),
     "node": ("paramove.cli.node", "Look at the nodes on the bus."),
     "host": ("paramove.cli.host", "Trust and check the other computers of a run."),

@@ -12,10 +12,11 @@ from typing import Annotated, Any
 
 import typer
 
-from paramove.bus import ExternalPublisher, Received, TopicTakenError, inspection, is_map, message_of, topics
+from paramove.bus import Received, TopicTakenError, inspection, is_map, topics
 from paramove.cli import completions
 from paramove.cli.bus_options import DomainOption, bus_folder, show, topic_named, with_old_keys
 from paramove.cli.output import JsonOption, ended, one_line
+from paramove.client import connect, message_of
 from paramove.documents import exit_codes, nearest
 
 app = typer.Typer(name="topic", help="Look at topics, messages and rates on the bus.", no_args_is_help=True)
@@ -166,29 +167,23 @@ def pub(
 
     The time of the message is that of the run. Nobody arms an arm so: `paramove arm enable` asks a person.
 
-    Exit codes: 0 published; 1 nothing runs, or nobody subscribes; 2 there is no such topic, or it is for nodes or
-    persons; 75 a node publishes it; 78 that is no message of the topic.
+    Exit codes: 0 published; 1 nobody subscribes; 2 there is no such topic; 66 nothing runs; 75 a node publishes it;
+    78 that is no message of the topic, or the topic is for nodes or persons.
     """
-    folder, topic = bus_folder(domain), topic_named(name)
-    if topic.truth or topic.is_request or topic in (topics.CLOCK, topics.HOSTS_LINK) or name.startswith("status/"):
-        whose = "persons: paramove arm enable, paramove arm stop" if topic.is_request else "nodes of the run"
-        raise ended(f"{topic.name} is for {whose}", exit_codes.USAGE)
-    with one_line():
-        message = message_of(topic.type, content)
+    topic = topic_named(name)
+    subscribers = False
     try:
-        with ExternalPublisher(folder, topic, "paramove topic pub") as publisher:
-            subscribers = publisher.wait_for_subscriber(wait_s)
+        with one_line(), connect(domain, "paramove topic pub") as run:
+            message = message_of(topic.type, content)
             for number in itertools.count(1):
-                publisher.publish(message)
+                subscribers = run.publish(topic.name, message, wait_s if number == 1 else 0.0)
                 if rate_hz is None or number == count:
                     break
-                publisher.idle(1 / rate_hz)
+                run.idle(1 / rate_hz)
     except KeyboardInterrupt:
         return
     except TopicTakenError as error:
         raise ended(f"{error}; a topic has one publisher: paramove node stop NAME", exit_codes.TEMPORARY) from error
-    except ValueError as error:
-        raise ended(str(error), exit_codes.CONFIGURATION) from error
     if not subscribers:
         raise ended(f"{topic.name}: published, but nobody subscribed within {wait_s:g} s", exit_codes.FAILURE)
 

@@ -134,6 +134,9 @@ class LaunchFile(_Checked):
         default_factory=dict, description="files that must be there; a terminal offers to make missing ones, in order"
     )
     headless: dict[str, Any] = Field(default_factory=dict, description="node.parameter: value that --headless sets")
+    external: list[str] = Field(
+        default_factory=list, description="topics that programs outside of the run publish, such as relocation/goal"
+    )
     after_run: Module | None = Field(
         default=None, description="module called with the run folder when all nodes have ended"
     )

@@ -53,6 +53,7 @@ def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Itera
     yield from _subscribers(launch, interfaces)
     yield from wrong_hosts(launch, interfaces)
     yield from _named_topics(launch, interfaces)
+    yield from _external_topics(launch, interfaces)
 
 
 def clock_publisher(interfaces: Mapping[str, Interface]) -> str | None:
@@ -91,8 +92,8 @@ def _subscribers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterato
         for topic in interface.subscribes:
             subscribed = on_bus(launch, name, topic)
             by_others = (
-                subscribed.startswith("status/") or topic in topics.BY_RELAYS
-            )  # by every node, or on several hosts
+                subscribed.startswith("status/") or topic in topics.BY_RELAYS or subscribed in launch.file.external
+            )  # by every node, on several hosts, or outside of the run
             is_optional = any(fnmatchcase(topic.name, one) for one in node.optional_topics)
             if not (subscribed in published or by_others or is_optional):
                 yield launch.error(
@@ -122,6 +123,20 @@ def _named_topics(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterat
             problem = _target_problem(used[topic], target)
             if problem:
                 yield launch.error(path, problem)
+
+
+def _external_topics(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
+    """Topics in `external` that no program may publish, that a node publishes, or that nobody subscribes to."""
+    publishers = {on_bus(launch, name, topic): name for name, one in interfaces.items() for topic in one.publishes}
+    used = {on_bus(launch, name, topic): topic for name, one in interfaces.items() for topic in one.subscribes}
+    for index, name in enumerate(launch.file.external):
+        path = ("external", str(index))
+        if name in publishers:
+            yield launch.error(path, f"'{publishers[name]}' publishes {name}; a topic has one publisher")
+        elif name not in used:
+            yield launch.error(path, f"no node of this launch file subscribes to {name!r}; {nearest(name, used)}")
+        elif used[name].truth or used[name].is_request or name == CLOCK.name or name.startswith("status/"):
+            yield launch.error(path, f"{name} is for nodes and persons, not for programs outside of the run")
 
 
 def _target_problem(topic: Topic, target: str) -> str:

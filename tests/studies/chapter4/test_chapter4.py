@@ -11,7 +11,7 @@ from studies.__main__ import app
 from studies.chapter4.experiments import QUICK, experiments
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_quick_writes_a_report_that_needs_no_other_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("studies.chapter4.command.user_cache_path", lambda name: tmp_path / "cache")
     arguments = [

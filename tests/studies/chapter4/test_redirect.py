@@ -1,8 +1,11 @@
 """The experiment on the redirect action."""
 
+import pytest
+
 from studies.chapter4.redirect import redirect_experiment
 
 
+@pytest.mark.long
 def test_sixteen_corner_pairs_teach_the_whole_region() -> None:
     rows = {(row["training"], row["model"]): row for row in redirect_experiment(0, tests=8)}
     assert len(rows) == 10

@@ -140,6 +140,7 @@ def test_the_command_prints_the_thesis_beside_ours(tmp_path: Path, monkeypatch: 
     assert str(tmp_path) in done.output.replace("\n", "")
 
 
+@pytest.mark.long
 def test_the_old_option_works_with_a_warning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with_grid = []
 

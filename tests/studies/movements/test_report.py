@@ -1,6 +1,8 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from studies.movements.report import leading, write_report
 from studies.movements.summary import QUANTITIES, Measured, summarised
 from studies.movements.sweep import Row, jobs_of, run_jobs
@@ -26,6 +28,7 @@ def test_more_coverage_than_promised_does_not_lead() -> None:
     assert leading(found, BY_NAME["covered"]) == {"b"}
 
 
+@pytest.mark.long
 def test_page_and_numbers(tasks: dict[str, list[Fold]], tmp_path: Path) -> None:
     row = Row("mean <path>", lambda seed: MeanPath(), ours=True)
     summary = summarised(run_jobs(jobs_of([row], tasks), tmp_path / "cache"))

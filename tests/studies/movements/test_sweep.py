@@ -64,6 +64,7 @@ def test_another_parameter_another_datum_another_code(
     assert job.key(digest) != before
 
 
+@pytest.mark.long
 def test_several_processes_find_the_same(tasks: dict[str, list[Fold]], tmp_path: Path) -> None:
     jobs = jobs_of([ROW], {"table/across": tasks["table/across"]})
     alone = run_jobs(jobs, tmp_path / "alone")

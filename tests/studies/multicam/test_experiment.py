@@ -28,6 +28,7 @@ def test_a_constant_offset_is_estimated(seen):
     assert relative @ OFFSET > 0.3 * OFFSET @ OFFSET, "the points take the rest of it"
 
 
+@pytest.mark.long
 def test_all_numbers(seen):
     numbers = numbers_of(*seen)
     assert numbers["reprojection_px"] < numbers["reprojection_without_offsets_px"]

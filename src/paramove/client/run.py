@@ -1,0 +1,218 @@
+"""A running application, seen and used by a program that is no node of it."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Self
+
+import zmq
+
+from paramove.bus import BusVisitor, Publisher, Received, Subscriber, Topic, default_folder, inspection, topics
+from paramove.client.content import message_of
+from paramove.documents import InputError
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
+from paramove.msgs.safety_state_pb2 import SafetyState
+from paramove.operator import stop_arm
+
+_POLL_MS = 20
+_REPEAT_S = 0.5
+_LAST_STATES = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED)
+
+
+class NoMessageError(RuntimeError):
+    """Nothing came on a topic in time; the text names the topic and its publisher."""
+
+
+def connect(domain: str | None = None, name: str = "client") -> Run:
+    """The application that runs in a domain, for a `with` block.
+
+    Args:
+        domain: Default: $PARAMOVE_DOMAIN, else "default".
+        name: Of this program, for the messages of others.
+
+    Raises InputError if nothing runs there.
+    """
+    folder = default_folder(domain)
+    if not folder.is_dir():
+        message = f"no bus at {folder}: nothing is running in this domain; start it with `paramove launch`"
+        raise InputError(message, missing=True)
+    return Run(folder, name)
+
+
+class Run(contextlib.AbstractContextManager["Run"]):
+    """One connection to a run, of one thread, while it is a context. Topics are called by their names.
+
+    Args:
+        folder: Of the run's bus.
+        name: Of this program.
+    """
+
+    def __init__(self, folder: Path, name: str = "client") -> None:
+        self._folder, self._name = folder, name
+        self._subscribers: dict[str, Subscriber] = {}
+        self._publishers: dict[str, Publisher] = {}
+        self._received: dict[str, deque[Received]] = {}
+        self._latest: dict[str, Received] = {}
+        self._now_ns = 0
+
+    def __enter__(self) -> Self:
+        self._visitor = BusVisitor(self._folder, self._name)
+        self._is_simulated = inspection.publisher_of(self._folder, topics.CLOCK).alive
+        if self._is_simulated:
+            self._subscribe(topics.CLOCK)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._visitor.close()
+
+    @property
+    def now_ns(self) -> int:
+        """Time of the run: simulated, or this host's monotonic clock."""
+        if not self._is_simulated:
+            return time.monotonic_ns()
+        self._step(0.0)
+        return self._now_ns
+
+    def latest(self, topic: str, timeout_s: float = 5.0) -> Any:
+        """The latest message of a topic; waits for one if there is none yet. Raises NoMessageError and InputError."""
+        row = self._subscribe(_topic(topic))
+        self._step(0.0)
+        self._until(lambda: row.name in self._latest, timeout_s)
+        if row.name not in self._latest:
+            state = inspection.publisher_of(self._folder, row)
+            reason = f"{state.holder} published nothing" if state.alive else "no publisher"
+            raise NoMessageError(f"{row.name}: {reason} within {timeout_s:g} s")
+        return self._latest[row.name].message
+
+    def listen(self, *names: str, seconds: float = math.inf) -> Iterator[Received]:
+        """Messages of topics with their times, as they arrive within `seconds`. Raises InputError for a wrong name."""
+        rows = [self._subscribe(_topic(name)) for name in names]
+        until_s = time.monotonic() + seconds
+        while True:
+            for row in rows:
+                while self._received[row.name]:
+                    yield self._received[row.name].popleft()
+            left_s = until_s - time.monotonic()
+            if left_s <= 0.0:
+                return
+            self._step(left_s)
+
+    def publish(self, topic: str, content: Any, wait_s: float = 2.0) -> bool:
+        """Publishes a message, captured now, on a topic that no node publishes.
+
+        Args:
+            topic: Its name.
+            content: A message of its type, or its fields: a mapping, or a text in YAML.
+            wait_s: How long to wait for a first subscriber, and for the time of the run.
+
+        Returns:
+            Whether somebody subscribes.
+
+        Raises:
+            TopicTakenError: Somebody publishes the topic.
+            InputError: There is no such topic, it is for nodes or persons, or that is no message of it.
+            ValueError: The message is larger than the topic allows.
+        """
+        row = _topic(topic)
+        message = message_of(row.type, content) if isinstance(content, str | Mapping) else content
+        publisher = self._publisher(row)
+        self._until(lambda: publisher.subscriptions > 0 and (self._now_ns > 0 or not self._is_simulated), wait_s)
+        now_ns = self.now_ns
+        publisher.publish(message, now_ns, now_ns)
+        self._step(0.0)
+        return publisher.subscriptions > 0
+
+    def idle(self, seconds: float) -> None:
+        """Waits, while new subscribers are served."""
+        self._until(lambda: False, seconds)
+
+    def send_goal(self, goal: Any, timeout_s: float = 60.0) -> RelocationStatus:
+        """Sends a goal to the robot's synthesizer, and waits for its last state: succeeded, failed or rejected.
+
+        For a launch file in which no node sends goals and `external` names `relocation/goal`. A goal moves an arm only
+        while it is armed.
+
+        Args:
+            goal: A RelocationGoal, or its fields. Without an id it gets one.
+            timeout_s: For the last state.
+
+        Raises:
+            NoMessageError: It has not come to an end in time.
+            TopicTakenError, InputError: As for `publish`.
+        """
+        message: RelocationGoal = (
+            message_of(RelocationGoal, goal)
+            if isinstance(goal, str | Mapping)
+            else RelocationGoal.FromString(goal.SerializeToString())
+        )
+        message.id = message.id or f"{self._name} {time.monotonic_ns()}"
+        message.attempt = message.attempt or 1
+        status_topic = self._subscribe(topics.RELOCATION_STATUS)
+        self._received[status_topic.name].clear()
+        until_s, latest = time.monotonic() + timeout_s, RelocationStatus()
+        while time.monotonic() < until_s:
+            if latest.state == RelocationStatus.STATE_UNSPECIFIED:  # repeated until it is acknowledged
+                self.publish(topics.RELOCATION_GOAL.name, message, wait_s=_REPEAT_S)
+            for received in self.listen(status_topic.name, seconds=_REPEAT_S):
+                status: RelocationStatus = received.message
+                if status.goal_id == message.id:
+                    latest = status
+                    if latest.state in _LAST_STATES:
+                        return latest
+        state = RelocationStatus.State.Name(latest.state).removeprefix("STATE_").lower()
+        raise NoMessageError(f"goal {message.id!r} has not ended within {timeout_s:g} s; its state is {state}")
+
+    def stop(self, timeout_s: float = 2.0) -> SafetyState | None:
+        """Stops the arm; returns the gate's answer, None if there was none in time."""
+        return stop_arm(self._folder, self._name, timeout_s)
+
+    def _subscribe(self, topic: Topic) -> Topic:
+        if topic.name not in self._subscribers:
+            self._subscribers[topic.name] = self._visitor.subscriber(topic)
+            self._received[topic.name] = deque(maxlen=topic.high_water_mark)
+        return topic
+
+    def _publisher(self, topic: Topic) -> Publisher:
+        if topic.truth or topic.name.startswith("status/") or topic in (topics.CLOCK, topics.HOSTS_LINK):
+            raise InputError(f"{topic.name} is for nodes of the run")
+        if topic.is_request:
+            raise InputError(f"{topic.name} is for persons: paramove arm enable, paramove arm stop")
+        if topic.name not in self._publishers:
+            self._publishers[topic.name] = self._visitor.publisher(topic)
+        return self._publishers[topic.name]
+
+    def _until(self, is_it: Callable[[], bool], timeout_s: float) -> None:
+        until_s = time.monotonic() + timeout_s
+        while not is_it():
+            left_s = until_s - time.monotonic()
+            if left_s <= 0.0:
+                return
+            self._step(left_s)
+
+    def _step(self, timeout_s: float) -> None:
+        """Waits until something can be read, a little at most, and reads it."""
+        poller = zmq.Poller()
+        for subscriber in self._subscribers.values():
+            subscriber.revive()
+            poller.register(subscriber.socket, zmq.POLLIN)
+        for publisher in self._publishers.values():
+            publisher.serve()
+        poller.poll(int(min(_POLL_MS, 1e3 * timeout_s)))
+        for name, subscriber in self._subscribers.items():
+            while (received := subscriber.receive()) is not None:
+                self._received[name].append(received)
+                self._latest[name] = received
+        if topics.CLOCK.name in self._latest:
+            self._now_ns = self._latest[topics.CLOCK.name].message.time_ns
+
+
+def _topic(name: str) -> Topic:
+    try:
+        return topics.by_name(name)
+    except (KeyError, ValueError) as error:
+        raise InputError(str(error.args[0])) from error

@@ -1,0 +1,115 @@
+"""A program that is no node: it reads, publishes, sends goals and stops, in the time of the run."""
+
+import os
+import threading
+
+import pytest
+
+import paramove
+from paramove.bus import Bus, BusSettings, LockstepBarrier, TopicTakenError, topics
+from paramove.client import NoMessageError, connect, message_of
+from paramove.documents import InputError
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
+from paramove.msgs.rule_pb2 import Speech
+
+STATUS = RelocationStatus
+
+
+def test_where_nothing_runs_that_is_said(folder):
+    with pytest.raises(InputError, match="nothing is running"):
+        paramove.connect()
+    with pytest.raises(InputError, match="domain"):
+        connect("../x")
+
+
+def test_what_is_published_comes_back(node):
+    with paramove.connect(name="test") as run:
+        assert run.latest("rules", 30.0).frame == "table"
+        rules = run.listen("rules", seconds=30.0)
+        assert run.publish("speech", {"text": "hello"}, wait_s=30.0)
+        assert next(one.message for one in rules if one.message.rules).rules[0].text == "hello"
+        assert run.publish("speech", Speech(text="again"))
+        assert next(rules).message.rules[0].text == "again"
+        assert run.latest("rules").rules[0].text == "again"
+
+
+def test_a_silent_topic_is_told_with_its_publisher(node):
+    with connect() as run:
+        with pytest.raises(NoMessageError, match=r"gestures: no publisher within 0\.1 s"):
+            run.latest("gestures", 0.1)
+        with pytest.raises(NoMessageError, match=rf"relocation/status: pid {os.getpid()} \(node\) published nothing"):
+            run.latest("relocation/status", 0.1)
+        assert list(run.listen("gestures", seconds=0.1)) == []
+
+
+@pytest.mark.parametrize(
+    ("topic", "content", "error", "words"),
+    [
+        ("rules", {}, TopicTakenError, "(node)"),
+        ("ruls", {}, InputError, "did you mean 'rules'?"),
+        ("speech", {"txt": "a"}, InputError, "txt"),
+        ("speech", "no mapping", InputError, "as a mapping"),
+        ("speech", {"text": "a" * 100_000}, ValueError, "the topic allows 65536"),
+        ("operator/arm", {"armed": True, "by_person": True}, InputError, "paramove arm enable"),
+        ("operator/stop", {}, InputError, "for persons"),
+        ("truth/state", {}, InputError, "for nodes"),
+        ("clock", {}, InputError, "for nodes"),
+        ("status/camera", {}, InputError, "for nodes"),
+    ],
+)
+def test_what_cannot_be_published_is_told(node, topic, content, error, words):
+    with connect() as run, pytest.raises(error) as raised:
+        run.publish(topic, content, wait_s=0.0)
+    assert words in str(raised.value)
+
+
+def test_a_goal_is_sent_until_it_is_acknowledged_and_followed_to_its_end(node):
+    with connect() as run:
+        done = run.send_goal({"kind": "KIND_REST", "object": "blue"}, 30.0)
+        assert done.state == STATUS.STATE_SUCCEEDED
+        done = run.send_goal(RelocationGoal(id="mine", object="red"), 30.0)
+        assert (done.goal_id, done.state, done.reason) == ("mine", STATUS.STATE_REJECTED, "red")
+        with pytest.raises(NoMessageError, match="its state is accepted"):
+            run.send_goal({}, 1.0)
+
+
+def test_a_message_may_be_written_as_yaml_or_json():
+    for text in ("{kind: KIND_REST, from: {x: 0.5}}", '{"kind": 5, "from": {"x": 0.5}}'):
+        goal = message_of(RelocationGoal, text)
+        assert (goal.kind, getattr(goal, "from").x) == (RelocationGoal.KIND_REST, 0.5)
+    with pytest.raises(InputError, match="NaN"):
+        message_of(RelocationGoal, {"from": {"x": float("nan")}})
+    with pytest.raises(InputError, match="the message"):
+        message_of(RelocationGoal, "{kind: [")
+
+
+def test_in_simulated_time_messages_have_the_time_of_the_run(folder):
+    made, ends = [], threading.Event()
+    settings = BusSettings(folder=folder, clock="simulated")
+
+    def tell_the_time():
+        with Bus("world", settings, (topics.SPEECH,), (topics.CLOCK,)) as bus:
+            barrier = LockstepBarrier(bus)
+            bus.ready("tells the time")
+            barrier.wait_for_members()
+            made.append(bus)
+            while not ends.is_set():
+                made.extend(barrier.advance(bus.now_ns + 10**8))
+                bus.idle(0.02)
+
+    world = threading.Thread(target=tell_the_time)
+    world.start()
+    try:
+        while not made:
+            ends.wait(0.01)
+        with connect() as run:
+            assert run.publish("speech", {"text": "now"}, wait_s=30.0)
+            begun_ns = run.now_ns
+            assert 0 < begun_ns < 10**12
+            while len(made) == 1:
+                run.idle(0.01)
+        assert made[1].message.text == "now"
+        assert 0 < made[1].captured_ns <= made[0].now_ns
+    finally:
+        ends.set()
+        world.join()
