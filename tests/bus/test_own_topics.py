@@ -69,6 +69,8 @@ def test_messages_import_each_other_and_those_of_others(user_workspace: UserWork
         ("lamp/: {type: {package}.Lamp}", "2:3", ("lower-case letters",)),
         ("speech: {type: {package}.Lamp}", "2:3", ("a topic of the library already",)),
         ("status/lamp: {type: {package}.Lamp}", "2:3", ("given by the library",)),
+        ("my/arm: {type: paramove.msgs.ArmRequest}", "2:12", ("for topics of the library alone",)),
+        ("my/clock: {type: paramove.msgs.Clock}", "2:14", ("for topics of the library alone",)),
         ("truth/lamp: {type: {package}.Lamp, recorded: true}", "2:3", ("ground truth", "not recorded")),
     ],
 )

@@ -18,9 +18,8 @@ from .envelope import RejectedError as RejectedError
 from .envelope import pack as pack
 from .envelope import unpack as unpack
 from .exchange import Exchange as Exchange
-from .fields import any_field as any_field
 from .fields import is_map as is_map
-from .fields import parts as parts
+from .fields import times_in as times_in
 from .fields import written_out as written_out
 from .inspection import BusVisitor as BusVisitor
 from .inspection import publish_now as publish_now

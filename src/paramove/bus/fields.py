@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from typing import Any
 
 from google.protobuf.descriptor import Descriptor, FieldDescriptor  # type: ignore[import-untyped]
 from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto  # type: ignore[import-untyped]
 
+_TIMESTAMP = "google.protobuf.Timestamp"
 FieldTest = Callable[[FieldDescriptor], bool]
 
 
@@ -34,6 +35,24 @@ def parts(field: FieldDescriptor, value: Any) -> Iterable[Any]:
     if is_map(field):
         return list(value.values())
     return value if is_repeated(field) else (value,)
+
+
+def times_in(message: Any) -> Iterator[Any]:
+    """Every `google.protobuf.Timestamp` in a message and its parts, itself included; they may be changed."""
+    if message.DESCRIPTOR.full_name == _TIMESTAMP:
+        yield message
+        return
+    for field, value in message.ListFields() if _has_times(message.DESCRIPTOR) else ():
+        for part in parts(field, value) if field.message_type is not None else ():
+            if hasattr(part, "ListFields"):  # a map may have plain values
+                yield from times_in(part)
+
+
+@cache
+def _has_times(descriptor: Descriptor) -> bool:
+    return any_field(
+        descriptor, lambda field: field.message_type is not None and field.message_type.full_name == _TIMESTAMP
+    )
 
 
 def any_field(descriptor: Descriptor, test: FieldTest) -> bool:

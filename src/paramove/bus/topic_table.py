@@ -15,12 +15,24 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from paramove.bus.own_messages import library_messages, own_messages
-from paramove.bus.topics import IMAGE_BYTES, NAME, OWN_TABLE, Profile, Topic
+from paramove.bus.topics import (
+    CLOCK,
+    HOSTS_LINK,
+    IMAGE_BYTES,
+    NAME,
+    OPERATOR_ARM,
+    OPERATOR_STOP,
+    OWN_TABLE,
+    Profile,
+    Topic,
+    status,
+)
 from paramove.documents import checked, nearest, raise_any, read_document
 from paramove.workspace import Workspace
 
 RESERVED = ("status/",)
 """Begins of names that the library gives itself."""
+RESERVED_TYPES = frozenset(topic.type_name for topic in (CLOCK, HOSTS_LINK, OPERATOR_ARM, OPERATOR_STOP, status("any")))
 
 
 class TopicRow(BaseModel):
@@ -85,6 +97,11 @@ def _topics_of(layer: Path, library: Mapping[str, Topic]) -> list[Topic]:
             faults.append(document.error(("topics", name), fault))
         if message is None:
             fault = f"there is no message '{row.type}'; {nearest(row.type, types)}"
+            faults.append(document.error(("topics", name, "type"), fault))
+        elif row.type in RESERVED_TYPES:
+            fault = (
+                f"{row.type} is for topics of the library alone: who may arm, stop and tell the time depends on them"
+            )
             faults.append(document.error(("topics", name, "type"), fault))
         else:
             found.append(_topic(name, row, message))

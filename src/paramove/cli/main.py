@@ -40,6 +40,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "models": ("paramove.cli.models", "List, show, plot and compare movement models."),
     "recognize": ("paramove.cli.recognize", "Recognize the action of a movement and its parameters."),
     "synthesize": ("paramove.cli.synthesize", "Make the movement for given parameters."),
+    "bag": ("paramove.cli.bag", "Look into a recording, or play it on a bus."),
     "recover": ("paramove.cli.recover", "Rebuild a recording whose writer was killed or whose bytes are damaged."),
     "evaluate": ("paramove.cli.evaluate", "Repeat experiments and measure their success."),
     "warm": ("paramove.cli.warm", "Compile kernels and train the reaching model, so that the first run starts fast."),

@@ -6,7 +6,7 @@ import contextlib
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self
 
@@ -120,12 +120,23 @@ class Run(contextlib.AbstractContextManager["Run"]):
         """
         row = _topic(topic)
         message = message_of(row.type, content) if isinstance(content, str | Mapping) else content
-        publisher = self._publisher(row)
-        self._until(lambda: publisher.subscriptions > 0 and (self._now_ns > 0 or not self._is_simulated), wait_s)
+        publisher = self.offer(row)
+        self.wait_for_subscribers([publisher], wait_s)
         now_ns = self.now_ns
         publisher.publish(message, now_ns, now_ns)
         self._step(0.0)
         return publisher.subscriptions > 0
+
+    def wait_for_subscribers(self, publishers: Iterable[Publisher], wait_s: float) -> bool:
+        """Waits until each of them has a subscriber, in simulated time also until that is known; whether one has."""
+        offered = list(publishers)
+
+        def is_on() -> bool:
+            knows_the_time = self._now_ns > 0 or not self._is_simulated
+            return knows_the_time and all(one.subscriptions for one in offered)
+
+        self._until(is_on, wait_s)
+        return any(one.subscriptions for one in offered)
 
     def idle(self, seconds: float) -> None:
         """Waits, while new subscribers are served."""
@@ -177,7 +188,8 @@ class Run(contextlib.AbstractContextManager["Run"]):
             self._received[topic.name] = deque(maxlen=topic.high_water_mark)
         return topic
 
-    def _publisher(self, topic: Topic) -> Publisher:
+    def offer(self, topic: Topic) -> Publisher:
+        """Becomes the publisher of a topic, if it is not yet; subscribers connect from now on. Raises as `publish`."""
         if topic.truth or topic.name.startswith("status/") or topic in (topics.CLOCK, topics.HOSTS_LINK):
             raise InputError(f"{topic.name} is for nodes of the run")
         if topic.is_request:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
-
-from google.protobuf.descriptor import Descriptor, FieldDescriptor  # type: ignore[import-untyped]
 
 from paramove.bus import (
     LATEST_NS,
@@ -13,17 +10,15 @@ from paramove.bus import (
     Reason,
     RejectedError,
     Topic,
-    any_field,
     decoded,
     impossible_time,
-    parts,
+    times_in,
     topics,
 )
 from paramove.hosts.clock_offset import ClockOffset
 
 LARGEST_BOUND_NS = 5_000_000
 """Where the offset of a clock is known less well, nobody can tell how old a command is."""
-_TIMESTAMP = "google.protobuf.Timestamp"
 
 
 class UnknownTimeError(Exception):
@@ -59,7 +54,8 @@ def in_own_time(
     if impossible:  # where numbers are not checked: of a request to arm, and of a trajectory, which its driver checks
         raise RejectedError(Reason.NUMBER, f"{impossible}, which never was")
     ahead_ns = clock.offset_ns(now_ns)
-    _set_back(message, ahead_ns)
+    for time in times_in(message):
+        time.FromNanoseconds(_earlier(time.ToNanoseconds(), ahead_ns))
     moved = envelope._replace(
         published_ns=envelope.published_ns - ahead_ns, captured_ns=envelope.captured_ns - ahead_ns
     )
@@ -74,24 +70,3 @@ def _earlier(time_ns: int, by_ns: int) -> int:
             Reason.NUMBER, f"a time of {time_ns} ns there is {time_ns - by_ns} ns by the clock here, which never was"
         )
     return time_ns - by_ns
-
-
-def _set_back(message: Any, by_ns: int) -> None:
-    """Every time in a message and its parts."""
-    if message.DESCRIPTOR.full_name == _TIMESTAMP:
-        message.FromNanoseconds(_earlier(message.ToNanoseconds(), by_ns))
-        return
-    for field, value in message.ListFields() if _has_times(message.DESCRIPTOR) else ():
-        for part in parts(field, value) if field.message_type is not None else ():
-            if hasattr(part, "ListFields"):  # a map may have plain values
-                _set_back(part, by_ns)
-
-
-@cache
-def _has_times(kind: Descriptor) -> bool:
-    """Whether there is a time in messages of this type, or in a part of them."""
-    return any_field(kind, _is_time)
-
-
-def _is_time(field: FieldDescriptor) -> bool:
-    return field.message_type is not None and field.message_type.full_name == _TIMESTAMP

@@ -1,6 +1,9 @@
+from .contents import RecordedTopic as RecordedTopic
+from .contents import contents as contents
 from .parts import PartedRecording as PartedRecording
 from .reader import Recorded as Recorded
 from .reader import read as read
+from .reader import read_any as read_any
 from .recorder import Recorder as Recorder
 from .recovery import Recovery as Recovery
 from .recovery import RecoveryError as RecoveryError

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import IO, Any
 
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
-from mcap.records import Channel, Chunk, McapRecord, Message
+from mcap.records import Channel, Chunk, McapRecord, Message, Schema
 from mcap.stream_reader import StreamReader
 
 from paramove.bus import topics
 from paramove.documents import InputError
 from paramove.recording.chunks import RECORD_BYTES, WRONG, allowance, records, whole
+from paramove.recording.recorded_types import type_of
 
 MESSAGE_BYTES = 2**24
 """Of one message: as much as the largest topic allows."""
@@ -54,17 +55,50 @@ def read(path: Path, only: Collection[str] = (), raising: type[InputError] = Inp
         InputError: A message is not of its topic's type, or too large.
         KeyError: The file has a topic that is not in the topic table.
     """
+    yield from _read(path, only, raising, None)
+
+
+def read_any(path: Path, only: Collection[str] = (), raising: type[InputError] = InputError) -> Iterator[Recorded]:
+    """As `read`, but a topic that is not in the topic table is decoded by the schema that the recording has of it.
+
+    Channels of other encodings than protobuf are left out.
+    """
+    yield from _read(path, only, raising, {})
+
+
+def _read(
+    path: Path, only: Collection[str], raising: type[InputError], schemas: dict[int, Schema] | None
+) -> Iterator[Recorded]:
+    """The messages; with `schemas`, which are collected there, also those of topics that no table here knows."""
     channels: dict[int, topics.Topic] = {}
     with path.open("rb") as file:
         for record in _records(file, path.stat().st_size):
-            if isinstance(record, Channel):
+            if isinstance(record, Schema) and schemas is not None:
+                schemas[record.id] = record
+            elif isinstance(record, Channel):
                 name = topics.OLD_NAMES.get(record.topic, record.topic)
-                if not only or name in only or record.topic in only:
-                    channels[record.id] = topics.by_name(name)
+                if only and name not in only and record.topic not in only:
+                    continue
+                topic = topics.by_name(name) if schemas is None else _row(name, record, schemas)
+                if topic is not None:
+                    channels[record.id] = topic
             elif isinstance(record, Message) and record.channel_id in channels:
                 topic = channels[record.channel_id]
                 message = _decoded(path, topic, record, raising)
                 yield Recorded(topic.name, message, record.log_time, record.publish_time, record.sequence)
+
+
+def _row(name: str, channel: Channel, schemas: dict[int, Schema]) -> topics.Topic | None:
+    """The topic's row of the table, or one by its schema in the recording; None if that cannot be read."""
+    schema = schemas.get(channel.schema_id)
+    with contextlib.suppress(KeyError, ValueError):
+        row = topics.by_name(name)
+        if schema is None or schema.name == row.type_name or row is topics.TRUTH_VIEW:
+            return row
+    if schema is not None:
+        with contextlib.suppress(InputError):
+            return topics.Topic(name, type_of(schema), None, topics.Profile.QUEUE)
+    return None
 
 
 def _records(file: IO[bytes], size: int) -> Iterator[McapRecord]:
