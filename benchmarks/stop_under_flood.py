@@ -475,17 +475,16 @@ class Scenes:
     def __init__(self, case: Case, count: int, busy: int, namespaces: Namespaces | None) -> None:
         self._case, self._namespaces, self._busy = case, namespaces, busy
         self._opened = [contextlib.ExitStack() for _ in range(count)]
-        self._beside = contextlib.ExitStack()
         self._scenes: list[Scene] = []
         self._next = 0
 
     def __enter__(self) -> Scenes:
         with contextlib.ExitStack() as opened:
-            for one in (self._beside, *self._opened):
+            for one in self._opened:
                 opened.enter_context(one)
             self._scenes = [self._new(number) for number in range(len(self._opened))]
             for _ in range(self._busy):
-                self._beside.enter_context(program(sys.executable, "-c", "while True: pass"))
+                opened.enter_context(program(sys.executable, "-c", "while True: pass"))
             self._all = opened.pop_all()
         return self
 

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from paramove.bus import BusVisitor, topics
+from paramove.bus import topics
 from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
 from paramove.cli.main import COMMANDS, build
@@ -25,6 +25,7 @@ from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 from paramove.msgs.rule_pb2 import Rule, Rules
 from tests.own_workspace import UserWorkspace
+from tests.received_messages import received_while
 
 Run = Callable[..., Any]
 RULES = Rules(frame="table", rules=[Rule(object="blue"), Rule(object="green", x=0.5)])
@@ -157,32 +158,19 @@ def test_type_and_interface_show_what_a_topic_carries(run: Run, user_workspace: 
 
 
 def test_pub_publishes_once_with_a_subscriber(run: Run, speaking: Path) -> None:
-    received: list[Any] = []
-    folder = Path(os.environ["XDG_RUNTIME_DIR"]) / "paramove" / "default"
-    with BusVisitor(folder) as visitor:
-        subscriber = visitor.subscriber(topics.SPEECH)
-        end = threading.Event()
+    done: list[Any] = []
 
-        def read() -> None:
-            while not end.wait(0.01):
-                subscriber.revive()
-                while (one := subscriber.receive()) is not None:
-                    received.append(one)
+    def publish() -> None:
+        done.append(run("topic", "pub", "speech", "{text: hello}", "--wait", "30"))
+        done.append(run("topic", "pub", "speech", "{text: again}", "--rate", "50", "--count", "3", "--wait", "30"))
 
-        reader = threading.Thread(target=read)
-        reader.start()
-        try:
-            done = run("topic", "pub", "speech", "{text: hello}", "--wait", "30")
-            again = run("topic", "pub", "speech", "{text: again}", "--rate", "50", "--count", "3", "--wait", "30")
-        finally:
-            end.set()
-            reader.join()
-    assert (done.exit_code, again.exit_code) == (0, 0), done.output + again.output
+    received = received_while(speaking, [topics.SPEECH], publish)
+    assert [one.exit_code for one in done] == [0, 0], [one.output for one in done]
     assert {one.message.text for one in received} == {"hello", "again"}
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "told"),
+    ("words", "code", "printed"),
     [
         (("gestures", "{object: red}"), exit_codes.TEMPORARY, "(recognizer)"),
         (("speech", "{txt: hello}"), exit_codes.CONFIGURATION, "txt"),
@@ -197,9 +185,11 @@ def test_pub_publishes_once_with_a_subscriber(run: Run, speaking: Path) -> None:
         (("status/camera", "{}"), exit_codes.CONFIGURATION, "for nodes"),
     ],
 )
-def test_what_pub_rejects_is_told(run: Run, speaking: Path, words: tuple[str, ...], code: int, told: str) -> None:
+def test_what_pub_rejects_is_reported(
+    run: Run, speaking: Path, words: tuple[str, ...], code: int, printed: str
+) -> None:
     done = run("topic", "pub", *words)
-    assert (done.exit_code, told in done.output) == (code, True), done.output
+    assert (done.exit_code, printed in done.output) == (code, True), done.output
 
 
 def test_node_info_shows_topics_and_the_nodes_at_them(run: Run, speaking: Path) -> None:

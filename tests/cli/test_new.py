@@ -13,7 +13,7 @@ def new(tmp_path, monkeypatch):
     return lambda *words: CliRunner().invoke(build("new"), ["new", *words])
 
 
-def test_every_file_is_told_and_has_the_name_of_the_application(new, tmp_path):
+def test_every_file_is_reported_and_has_the_name_of_the_application(new, tmp_path):
     done = new("my_robot")
     assert done.exit_code == 0, done.output
     written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()}

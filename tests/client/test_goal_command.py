@@ -30,11 +30,11 @@ def test_json_has_the_whole_status(node):
     assert json.loads(send("{object: blue}", "--json").output)["state"] == "STATE_SUCCEEDED"
 
 
-def test_a_goal_without_an_end_is_told(node):
+def test_a_goal_without_an_end_is_reported(node):
     done = send("{}", "--wait", "1")
     assert (done.exit_code, "has not ended within 1 s" in done.output) == (exit_codes.FAILURE, True)
 
 
-def test_where_nothing_runs_that_is_told(folder):
+def test_where_nothing_runs_that_is_reported(folder):
     done = send("{}")
     assert (done.exit_code, "nothing is running" in done.output) == (exit_codes.INPUT_MISSING, True)

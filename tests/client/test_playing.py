@@ -1,7 +1,6 @@
 """A recording played on a bus: its messages, at their distances, in the time of now; nothing that arms or stops."""
 
 import os
-import threading
 
 import pytest
 from typer.testing import CliRunner
@@ -16,6 +15,7 @@ from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.rule_pb2 import Speech
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
 from paramove.recording import RecordingWriter, contents
+from tests.received_messages import received_while
 
 BEGIN_NS, STEP_NS = 5 * 10**9, 10**8
 
@@ -41,35 +41,11 @@ def recording(tmp_path):
     return path
 
 
-def received_while(folder, names, act):
-    """What arrives on topics while `act` runs."""
-    found, end = [], threading.Event()
-    with BusVisitor(folder) as visitor:
-        subscribers = [visitor.subscriber(topics.by_name(name)) for name in names]
-
-        def read():
-            while not end.wait(0.002):
-                for subscriber in subscribers:
-                    subscriber.revive()
-                    while (one := subscriber.receive()) is not None:
-                        found.append(one)
-
-        reader = threading.Thread(target=read)
-        reader.start()
-        try:
-            act()
-        finally:
-            end.wait(0.3)
-            end.set()
-            reader.join()
-    return found
-
-
 def test_a_recording_is_played_in_its_order_and_time(folder, recording):
     with Run(folder) as run:
         found = received_while(
             folder,
-            ("gestures", "speech", "operator/arm", "operator/stop", "relocation/goal"),
+            (topics.GESTURES, topics.SPEECH, topics.OPERATOR_ARM, topics.OPERATOR_STOP, topics.RELOCATION_GOAL),
             lambda: play(run, recording, rate=2.0, wait_s=30.0),
         )
     assert {one.topic.name for one in found} == {"gestures", "speech"}
@@ -85,7 +61,7 @@ def test_named_topics_are_played_from_a_time_on(folder, recording):
     with Run(folder) as run:
         found = received_while(
             folder,
-            ("gestures", "relocation/goal"),
+            (topics.GESTURES, topics.RELOCATION_GOAL),
             lambda: play(run, recording, ["relocation/goal"], rate=100.0, start_s=0.55, wait_s=30.0),
         )
     assert [one.message.id for one in found] == ["6", "7", "8", "9"]
@@ -118,22 +94,8 @@ def test_a_topic_of_another_workspace_is_read_and_played_by_its_recorded_schema(
         topics.by_name("some/topic")
     (recorded,) = contents(path)
     assert (recorded.name, recorded.type_name, recorded.messages) == ("some/topic", own.type_name, 1)
-    found = []
-
-    def read():
-        with BusVisitor(folder) as visitor:
-            subscriber = visitor.subscriber(own)
-            while not found:
-                subscriber.revive()
-                if (one := subscriber.receive()) is not None:
-                    found.append(one)
-
-    reader = threading.Thread(target=read)
-    reader.start()
     with Run(folder) as run:
-        play(run, path, wait_s=30.0)
-        run.idle(1.0)
-    reader.join(30)
+        found = received_while(folder, [own], lambda: play(run, path, wait_s=30.0))
     assert found[0].message.height == 2.0
     assert found[0].message.at.ToNanoseconds() == found[0].published_ns
 
@@ -146,18 +108,18 @@ def test_bag_info_lists_the_topics(recording):
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "told"),
+    ("words", "code", "printed"),
     [
         (("--topics", "gestres"), exit_codes.CONFIGURATION, "did you mean 'gestures'?"),
         (("--topics", "operator/arm"), exit_codes.CONFIGURATION, "not played"),
     ],
 )
-def test_what_bag_play_rejects_is_told(folder, recording, words, code, told):
+def test_what_bag_play_rejects_is_reported(folder, recording, words, code, printed):
     done = CliRunner().invoke(build("bag"), ["bag", "play", str(recording), *words, "--wait", "0"])
-    assert (done.exit_code, told in done.output) == (code, True), done.output
+    assert (done.exit_code, printed in done.output) == (code, True), done.output
 
 
-def test_a_topic_that_a_node_publishes_is_told_with_the_node(folder, recording):
+def test_a_topic_that_a_node_publishes_is_reported_with_the_node(folder, recording):
     with BusVisitor(folder, "node") as node:
         node.publisher(topics.SPEECH)
         done = CliRunner().invoke(build("bag"), ["bag", "play", str(recording), "--wait", "0"])

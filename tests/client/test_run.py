@@ -33,7 +33,7 @@ def test_what_is_published_comes_back(node):
         assert run.latest("rules").rules[0].text == "again"
 
 
-def test_a_silent_topic_is_told_with_its_publisher(node):
+def test_a_topic_without_messages_is_reported_with_its_publisher(node):
     with connect() as run:
         with pytest.raises(NoMessageError, match=r"gestures: no publisher within 0\.1 s"):
             run.latest("gestures", 0.1)
@@ -57,7 +57,7 @@ def test_a_silent_topic_is_told_with_its_publisher(node):
         ("status/camera", {}, InputError, "for nodes"),
     ],
 )
-def test_what_cannot_be_published_is_told(node, topic, content, error, words):
+def test_what_cannot_be_published_is_rejected_with_the_reason(node, topic, content, error, words):
     with connect() as run, pytest.raises(error) as raised:
         run.publish(topic, content, wait_s=0.0)
     assert words in str(raised.value)
@@ -90,7 +90,7 @@ def test_in_simulated_time_messages_have_the_time_of_the_run(folder):
     def tell_the_time():
         with Bus("world", settings, (topics.SPEECH,), (topics.CLOCK,)) as bus:
             barrier = LockstepBarrier(bus)
-            bus.ready("tells the time")
+            bus.ready("publishes the time")
             barrier.wait_for_members()
             made.append(bus)
             while not ends.is_set():

@@ -133,12 +133,12 @@ def test_too_few_open_files_are_told(limit, level):
         (False, 0, Level.WARNING),
     ],
 )
-def test_a_driver_that_may_not_come_before_other_programs_is_told(may_set_any, limit, level):
+def test_a_driver_that_may_not_come_before_other_programs_is_reported(may_set_any, limit, level):
     assert priority_finding(may_set_any, limit).level is level
 
 
 @needs_root
-def test_an_ordinary_user_is_told_how_to_get_the_priority():
+def test_the_remedy_gives_an_ordinary_user_the_priority():
     code = "print(json.dumps(told(priority_finding(False, 0))))"
     line, _ = as_nobody(priority_finding, code)["remedy"]
     assert line.startswith("echo $(id -un) - nice -10 | sudo tee /etc/security/limits.d/")

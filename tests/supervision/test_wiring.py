@@ -182,7 +182,7 @@ def test_a_topic_from_outside_needs_no_publisher(workspace):
 
 
 @pytest.mark.parametrize(
-    ("external", "told"),
+    ("external", "reason"),
     [
         ("speech", "'main' publishes speech"),
         ("relocation/gaol", "did you mean 'relocation/goal'?"),
@@ -190,8 +190,8 @@ def test_a_topic_from_outside_needs_no_publisher(workspace):
         ("truth/state", "for nodes and persons"),
     ],
 )
-def test_a_topic_that_nobody_may_or_needs_to_publish_from_outside_is_told(workspace, external, told):
+def test_a_topic_that_nobody_may_or_needs_to_publish_from_outside_is_rejected(workspace, external, reason):
     reader_of_goals(workspace, "topics.OPERATOR_STOP, topics.TRUTH_STATE")
     with pytest.raises(DocumentError) as raised:
         checked(workspace, f"external: [{external}]\nnodes: {{main: {{module: nodes.goal_reader, truth: true}}}}")
-    assert told in next(finding.message for finding in raised.value if finding.position.line == 1)
+    assert reason in next(finding.message for finding in raised.value if finding.position.line == 1)

@@ -36,7 +36,7 @@ def run(short_folder, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_an_arm_does_what_is_sent_and_stops_when_told(run):
+def test_an_arm_does_what_is_sent_and_stops_on_request(run):
     assert run.send_goal({"kind": "KIND_REST", "frame": "arm_base"}, 120.0).state == RelocationStatus.STATE_SUCCEEDED
     rejected = run.send_goal({"kind": "KIND_REST", "frame": "nowhere"}, 60.0)
     assert rejected.state == RelocationStatus.STATE_REJECTED

@@ -71,7 +71,7 @@ def test_its_topics_are_shown_with_the_others(folder):
     )
 
 
-def test_a_node_that_names_no_topic_is_told_the_nearest(folder):
+def test_for_a_node_that_names_no_topic_the_nearest_is_named(folder):
     node = folder / "nodes" / "cart_driver.py"
     node.write_text(node.read_text().replace("(topics.CART_STATE,)", "(topics.CART_STAT,)"))
     check = paramove(folder, "launch", "my_robot", "--check")

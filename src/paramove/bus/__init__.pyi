@@ -20,6 +20,7 @@ from .envelope import unpack as unpack
 from .exchange import Exchange as Exchange
 from .fields import is_map as is_map
 from .fields import times_in as times_in
+from .fields import value_of as value_of
 from .fields import written_out as written_out
 from .inspection import BusVisitor as BusVisitor
 from .inspection import publish_now as publish_now
@@ -47,6 +48,7 @@ from .settings import BusSettings as BusSettings
 from .settings import default_folder as default_folder
 from .settings import lock_of as lock_of
 from .settings import nodes_in as nodes_in
+from .settings import running_folder as running_folder
 from .soundness import LATEST_NS as LATEST_NS
 from .soundness import impossible_time as impossible_time
 from .soundness import unsound as unsound

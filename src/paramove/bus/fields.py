@@ -14,8 +14,13 @@ FieldTest = Callable[[FieldDescriptor], bool]
 
 
 def is_map(field: FieldDescriptor) -> bool:
-    """Whether a field is a map; its value is called `value` in the message type of its entries."""
+    """Whether a field is a map."""
     return field.message_type is not None and field.message_type.GetOptions().map_entry
+
+
+def value_of(field: FieldDescriptor) -> FieldDescriptor:
+    """The field that has the type of a field's values: of a map that of its entries' values, else the field itself."""
+    return field.message_type.fields_by_name["value"] if is_map(field) else field
 
 
 def is_repeated(field: FieldDescriptor) -> bool:
@@ -42,17 +47,20 @@ def times_in(message: Any) -> Iterator[Any]:
     if message.DESCRIPTOR.full_name == _TIMESTAMP:
         yield message
         return
-    for field, value in message.ListFields() if _has_times(message.DESCRIPTOR) else ():
-        for part in parts(field, value) if field.message_type is not None else ():
-            if hasattr(part, "ListFields"):  # a map may have plain values
+    for field, value in message.ListFields():
+        kind = value_of(field).message_type
+        if kind is not None and _has_times(kind):  # the thousands of points of a trajectory have none
+            for part in parts(field, value):
                 yield from times_in(part)
 
 
 @cache
 def _has_times(descriptor: Descriptor) -> bool:
-    return any_field(
-        descriptor, lambda field: field.message_type is not None and field.message_type.full_name == _TIMESTAMP
-    )
+    return descriptor.full_name == _TIMESTAMP or any_field(descriptor, _is_time)
+
+
+def _is_time(field: FieldDescriptor) -> bool:
+    return field.message_type is not None and field.message_type.full_name == _TIMESTAMP
 
 
 def any_field(descriptor: Descriptor, test: FieldTest) -> bool:
@@ -78,7 +86,7 @@ def written_out(descriptor: Descriptor) -> str:
         one = waiting.pop(0)
         blocks.append(_block(one))
         for field in one.fields:
-            part = field.message_type.fields_by_name["value"].message_type if is_map(field) else field.message_type
+            part = value_of(field).message_type
             if part is not None and part.full_name not in seen and not part.full_name.startswith("google."):
                 seen.add(part.full_name)
                 waiting.append(part)
@@ -87,8 +95,8 @@ def written_out(descriptor: Descriptor) -> str:
 
 def _block(descriptor: Descriptor) -> str:
     lines = [f"message {descriptor.full_name} {{"]
-    values = [field.message_type.fields_by_name["value"] if is_map(field) else field for field in descriptor.fields]
-    enumerations = {value.enum_type.full_name: value.enum_type for value in values if value.enum_type is not None}
+    kinds = [value_of(field).enum_type for field in descriptor.fields]
+    enumerations = {kind.full_name: kind for kind in kinds if kind is not None}
     for name, enumeration in enumerations.items():
         numbers = " ".join(f"{value.name} = {value.number};" for value in enumeration.values)
         lines.append(f"  enum {name} {{ {numbers} }}")
@@ -103,8 +111,7 @@ def _block(descriptor: Descriptor) -> str:
 
 def _type_name(field: FieldDescriptor) -> str:
     if is_map(field):
-        parts_of_entry = field.message_type.fields_by_name
-        return f"map<{_type_name(parts_of_entry['key'])}, {_type_name(parts_of_entry['value'])}>"
+        return f"map<{_type_name(field.message_type.fields_by_name['key'])}, {_type_name(value_of(field))}>"
     if field.message_type is not None:
         return str(field.message_type.full_name)
     if field.enum_type is not None:

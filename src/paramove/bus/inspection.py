@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -153,7 +153,7 @@ def listen(folder: Path, selected: Sequence[Topic], seconds: float = math.inf) -
             for subscriber in subscribers:
                 while (received := subscriber.receive()) is not None:
                     yield received
-            _poll(subscribers, end_s)
+            wait(subscribers, end_s - time.monotonic())
 
 
 def measure(folder: Path, selected: Sequence[Topic], seconds: float) -> list[Measurement]:
@@ -171,7 +171,7 @@ def measure(folder: Path, selected: Sequence[Topic], seconds: float) -> list[Mea
                         measurement.sizes.append(len(payload))
                         measurement.published_s.append(1e-9 * envelope.published_ns)
                         measurement.captured_s.append(1e-9 * envelope.captured_ns)
-            _poll(subscribers, end_s)
+            wait(subscribers, end_s - time.monotonic())
     return measurements
 
 
@@ -187,10 +187,17 @@ def statuses(folder: Path, seconds: float) -> dict[str, Any]:
     return latest
 
 
-def _poll(subscribers: list[Subscriber], end_s: float) -> None:
-    """Waits until something can be read, not beyond `end_s`; reopens sockets that libzmq has given up."""
+def why_nothing_came(folder: Path, topic: Topic, seconds: float) -> str:
+    """For a message: whether a topic has no publisher, or who published nothing within so long."""
+    state = publisher_of(folder, topic)
+    reason = f"{state.holder} published nothing" if state.alive else "no publisher"
+    return f"{topic.name}: {reason} within {seconds:g} s"
+
+
+def wait(subscribers: Iterable[Subscriber], seconds: float) -> None:
+    """Waits until something can be read, a little at most; reopens sockets that libzmq has given up."""
     poller = zmq.Poller()
     for subscriber in subscribers:
         subscriber.revive()
         poller.register(subscriber.socket, zmq.POLLIN)
-    poller.poll(int(max(0.0, min(_POLL_MS, 1000 * (end_s - time.monotonic())))))
+    poller.poll(int(max(0.0, min(_POLL_MS, 1000 * seconds))))

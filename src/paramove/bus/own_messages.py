@@ -62,12 +62,8 @@ def message_types() -> dict[str, type[Any]]:
 
 def _sources(root: Path) -> list[Path]:
     """Its `.proto` files but those of the library, which lie in the same folder of a clone."""
-    own = (path for path in (root / FOLDER).glob("*.proto") if not _has_code(f"paramove/msgs/{path.name}"))
+    own = (path for path in (root / FOLDER).glob("*.proto") if _code_of(f"paramove/msgs/{path.name}") is None)
     return sorted(own)
-
-
-def _has_code(file: str) -> bool:
-    return _code_of(file) is not None
 
 
 def _code_of(file: str) -> Any:

@@ -10,7 +10,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from paramove.bus.topics import Topic
-from paramove.documents import checked_name
+from paramove.documents import InputError, checked_name
 
 
 def default_folder(domain: str | None = None) -> Path:
@@ -26,6 +26,15 @@ def default_folder(domain: str | None = None) -> Path:
     if runtime.startswith("/") and os.access(runtime, os.W_OK | os.X_OK):
         return Path(runtime) / "paramove" / domain
     return Path(tempfile.gettempdir()) / f"paramove-{os.getuid()}" / domain
+
+
+def running_folder(domain: str | None = None) -> Path:
+    """Bus folder of a domain; raises InputError if there is none, since nothing runs there."""
+    folder = default_folder(domain)
+    if not folder.is_dir():
+        message = f"no bus at {folder}: nothing is running in this domain; start it with `paramove launch`"
+        raise InputError(message, missing=True)
+    return folder
 
 
 def nodes_in(folder: Path) -> list[str]:

@@ -13,7 +13,7 @@ from typing import Any
 from google.protobuf.descriptor import Descriptor, FieldDescriptor  # type: ignore[import-untyped]
 from google.protobuf.message_factory import GetMessageClass  # type: ignore[import-untyped]
 
-from paramove.bus.fields import any_field, is_map, is_repeated
+from paramove.bus.fields import any_field, is_map, is_repeated, value_of
 
 LARGEST = 1e12
 """Of any number; real values in SI units, pixels or counts are far smaller."""
@@ -58,7 +58,7 @@ def _check_of(field: FieldDescriptor, times_only: bool) -> _Check | None:
     """The check of one field; None where nothing in it is to be checked."""
     name, repeated = field.name, is_repeated(field)
     if is_map(field):
-        value_check = _check_of(field.message_type.fields_by_name["value"], times_only)
+        value_check = _check_of(value_of(field), times_only)
         return None if value_check is None else lambda message: _inside_map(field, message, value_check)
     if field.message_type is not None:
         if not _has_numbers(field.message_type, times_only):

@@ -15,24 +15,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from paramove.bus.own_messages import library_messages, own_messages
-from paramove.bus.topics import (
-    CLOCK,
-    HOSTS_LINK,
-    IMAGE_BYTES,
-    NAME,
-    OPERATOR_ARM,
-    OPERATOR_STOP,
-    OWN_TABLE,
-    Profile,
-    Topic,
-    status,
-)
+from paramove.bus.topics import IMAGE_BYTES, NAME, OWN_TABLE, RESERVED_TYPES, Profile, Topic
 from paramove.documents import checked, nearest, raise_any, read_document
 from paramove.workspace import Workspace
 
 RESERVED = ("status/",)
 """Begins of names that the library gives itself."""
-RESERVED_TYPES = frozenset(topic.type_name for topic in (CLOCK, HOSTS_LINK, OPERATOR_ARM, OPERATOR_STOP, status("any")))
 
 
 class TopicRow(BaseModel):

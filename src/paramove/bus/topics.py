@@ -37,6 +37,12 @@ from paramove.msgs.tracked_objects_pb2 import TrackedObjects
 from paramove.msgs.truth_pb2 import TruthArm, TruthLayout, TruthState
 from paramove.workspace import Workspace
 
+_OF_PERSONS = frozenset(kind.DESCRIPTOR.full_name for kind in (ArmRequest, StopRequest))
+_OF_NODES = frozenset(kind.DESCRIPTOR.full_name for kind in (Clock, LinkState, NodeStatus))
+RESERVED_TYPES = _OF_PERSONS | _OF_NODES
+"""Types of messages on which it depends who may arm and stop, and what time it is: for topics of the library alone."""
+_STATUS_PREFIX = "status/"
+
 
 class Profile(enum.Enum):
     """How a topic treats a message that a later one follows."""
@@ -83,6 +89,18 @@ class Topic:
     def truth(self) -> bool:
         """Whether only the simulator and evaluators may know the topic's folder."""
         return self.name.startswith("truth/")
+
+    @property
+    def reserved_for(self) -> str:
+        """Who alone publishes such a topic, for a message; "" where a program outside of a run may, too.
+
+        By the names of topic and type: a recording, and a workspace, may have classes of their own.
+        """
+        if self.type_name in _OF_PERSONS:
+            return "persons: paramove arm enable, paramove arm stop"
+        if self.truth or self.name.startswith(_STATUS_PREFIX) or self.type_name in _OF_NODES:
+            return "nodes of the run"
+        return ""
 
     @property
     def is_request(self) -> bool:
@@ -230,7 +248,6 @@ STOPS = (*PERSONS_STOPS, OPERATOR_STOP_AWAY)
 
 OWN_TABLE = "msgs/topics.yaml"
 """File of a workspace with topics of its own; see `topic_table`."""
-_STATUS_PREFIX = "status/"
 NAME = r"[a-z0-9_]+(/[a-z0-9_]+)*"
 _NAME = re.compile(NAME)
 

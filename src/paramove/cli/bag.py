@@ -45,7 +45,7 @@ def info(file: FileArgument, as_json: JsonOption = False) -> None:
     if as_json:
         typer.echo(json.dumps(rows, indent=2))
         return
-    duration_s = max(float(str(row["last_s"])) for row in rows)
+    duration_s = 1e-9 * (max(topic.last_ns for topic in recorded) - begin_ns)
     typer.echo(f"{file}: {duration_s:.1f} s, {sum(topic.messages for topic in recorded)} messages")
     show(rows, as_json=False)
 

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 
 import typer
 
-from paramove.bus import Topic, default_folder, topics
+from paramove.bus import Topic, running_folder, topics
 from paramove.cli import completions
 from paramove.cli.output import ended
-from paramove.documents import exit_codes
+from paramove.documents import InputError, exit_codes
 
 DomainOption = Annotated[
     str | None,
@@ -26,13 +26,12 @@ DomainOption = Annotated[
 
 def bus_folder(domain: str | None) -> Path:
     """Folder of the domain's sockets; ends the command if there is none, since nothing runs there."""
-    folder = default_folder(domain)
-    if not folder.is_dir():
-        raise ended(
-            f"no bus at {folder}: nothing is running in this domain; start it with `paramove launch`",
-            exit_codes.FAILURE,
-        )
-    return folder
+    try:
+        return running_folder(domain)
+    except InputError as error:
+        if not error.missing:
+            raise
+        raise ended(str(error), exit_codes.FAILURE) from error
 
 
 def topic_named(name: str) -> Topic:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from paramove.bus import Received, TopicTakenError, inspection, is_map, topics
+from paramove.bus import Received, TopicTakenError, inspection, is_map, topics, value_of
 from paramove.cli import completions
 from paramove.cli.bus_options import DomainOption, bus_folder, show, topic_named, with_old_keys
 from paramove.cli.output import JsonOption, ended, one_line
@@ -111,9 +111,7 @@ def echo(
             if messages == most:
                 return
         if messages == 0:
-            state = inspection.publisher_of(folder, topic)
-            reason = f"{state.holder} published nothing" if state.alive else "no publisher"
-            raise ended(f"{topic.name}: {reason} within {seconds:g} s", exit_codes.FAILURE)
+            raise ended(inspection.why_nothing_came(folder, topic, seconds or math.inf), exit_codes.FAILURE)
 
 
 def _print_message(received: Received, content: Any, as_json: bool, is_part: bool) -> None:
@@ -146,7 +144,7 @@ def _part(message: Any, path: str) -> Any:
             value = value[int(index)]
         elif is_map(field) and index in {str(key) for key in value}:
             value = next(item for key, item in value.items() if str(key) == index)
-            field = field.message_type.fields_by_name["value"]
+            field = value_of(field)
         else:
             return None
     return _json_value(field, value)
@@ -274,8 +272,7 @@ def _json_value(field: Any, value: Any) -> Any:
     if isinstance(value, bytes):
         return f"<{len(value)} bytes>" if len(value) > LONGEST_BYTES else value.hex()
     if is_map(field):
-        kind = field.message_type.fields_by_name["value"]
-        return {str(key): _json_value(kind, item) for key, item in value.items()}
+        return {str(key): _json_value(value_of(field), item) for key, item in value.items()}
     if hasattr(value, "__len__") and not isinstance(value, str):
         return [_json_value(field, item) for item in value]
     if field.enum_type:

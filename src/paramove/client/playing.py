@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from paramove.bus import CLOCK, Topic, times_in, topics
+from paramove.bus import Topic, times_in, topics
 from paramove.client.run import Run
 from paramove.documents import InputError, nearest
 from paramove.recording import RecordedTopic, contents, read_any
 
-_OF_A_RUN = frozenset(
-    row.type_name for row in (CLOCK, topics.HOSTS_LINK, topics.OPERATOR_ARM, topics.OPERATOR_STOP, topics.status("any"))
-)
 _COMMANDS = frozenset(
     row.type_name for row in (topics.ARM_TRAJECTORY, topics.RELOCATION_GOAL, topics.WIRE_HOAP3_STREAM)
 )
@@ -22,12 +18,9 @@ _COMMANDS = frozenset(
 
 
 def is_played(topic: Topic, named: bool = False) -> bool:
-    """Whether a recorded topic may be played: never what nodes or persons alone publish, commands only if `named`.
-
-    By the names of topic and type, as a recording may have types of its own.
-    """
-    row = next((one for one in topics.TOPICS if one.name == topic.name), topic)
-    if topic.truth or topic.name.startswith("status/") or {topic.type_name, row.type_name} & _OF_A_RUN:
+    """Whether a recorded topic may be played: never what nodes or persons alone publish, commands only if `named`."""
+    row = next((one for one in topics.TOPICS if one.name == topic.name), topic)  # a recording may have another type
+    if topic.reserved_for or row.reserved_for:
         return False
     return named or topic.type_name not in _COMMANDS
 
@@ -83,7 +76,7 @@ def _rows(path: Path, recorded: Sequence[RecordedTopic], names: Collection[str])
     missing = [name for name in names if name not in known]
     if missing:
         raise InputError(f"{path} has no topic '{missing[0]}'; {nearest(missing[0], known)}")
-    rows = [_row(known[name]) for name in names or known]
+    rows = [known[name].row for name in names or known]
     playable = [row for row in rows if is_played(row, named=bool(names))]
     if names and len(playable) < len(rows):
         others = ", ".join(row.name for row in rows if row not in playable)
@@ -91,12 +84,3 @@ def _rows(path: Path, recorded: Sequence[RecordedTopic], names: Collection[str])
     if not playable:
         raise InputError(f"{path} has no topic that is played")
     return playable
-
-
-def _row(recorded: RecordedTopic) -> Topic:
-    """The topic's row of the table, or one for a topic that no table here knows."""
-    with contextlib.suppress(KeyError, ValueError):
-        row = topics.by_name(recorded.name)
-        if row.type_name == recorded.type_name:
-            return row
-    return Topic(recorded.name, recorded.type, None, topics.Profile.QUEUE)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
 from collections import deque
@@ -10,16 +9,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self
 
-import zmq
-
-from paramove.bus import BusVisitor, Publisher, Received, Subscriber, Topic, default_folder, inspection, topics
+from paramove.bus import BusVisitor, Publisher, Received, Subscriber, Topic, inspection, running_folder, topics
 from paramove.client.content import message_of
 from paramove.documents import InputError
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.operator import stop_arm
 
-_POLL_MS = 20
+_SERVE_S = 0.02
 _REPEAT_S = 0.5
 _LAST_STATES = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED)
 
@@ -37,14 +34,10 @@ def connect(domain: str | None = None, name: str = "client") -> Run:
 
     Raises InputError if nothing runs there.
     """
-    folder = default_folder(domain)
-    if not folder.is_dir():
-        message = f"no bus at {folder}: nothing is running in this domain; start it with `paramove launch`"
-        raise InputError(message, missing=True)
-    return Run(folder, name)
+    return Run(running_folder(domain), name)
 
 
-class Run(contextlib.AbstractContextManager["Run"]):
+class Run:
     """One connection to a run, of one thread, while it is a context. Topics are called by their names.
 
     Args:
@@ -84,9 +77,7 @@ class Run(contextlib.AbstractContextManager["Run"]):
         self._step(0.0)
         self._until(lambda: row.name in self._latest, timeout_s)
         if row.name not in self._latest:
-            state = inspection.publisher_of(self._folder, row)
-            reason = f"{state.holder} published nothing" if state.alive else "no publisher"
-            raise NoMessageError(f"{row.name}: {reason} within {timeout_s:g} s")
+            raise NoMessageError(inspection.why_nothing_came(self._folder, row, timeout_s))
         return self._latest[row.name].message
 
     def listen(self, *names: str, seconds: float = math.inf) -> Iterator[Received]:
@@ -156,11 +147,8 @@ class Run(contextlib.AbstractContextManager["Run"]):
             NoMessageError: It has not come to an end in time.
             TopicTakenError, InputError: As for `publish`.
         """
-        message: RelocationGoal = (
-            message_of(RelocationGoal, goal)
-            if isinstance(goal, str | Mapping)
-            else RelocationGoal.FromString(goal.SerializeToString())
-        )
+        message = RelocationGoal()
+        message.CopyFrom(message_of(RelocationGoal, goal) if isinstance(goal, str | Mapping) else goal)
         message.id = message.id or f"{self._name} {time.monotonic_ns()}"
         message.attempt = message.attempt or 1
         status_topic = self._subscribe(topics.RELOCATION_STATUS)
@@ -190,10 +178,8 @@ class Run(contextlib.AbstractContextManager["Run"]):
 
     def offer(self, topic: Topic) -> Publisher:
         """Becomes the publisher of a topic, if it is not yet; subscribers connect from now on. Raises as `publish`."""
-        if topic.truth or topic.name.startswith("status/") or topic in (topics.CLOCK, topics.HOSTS_LINK):
-            raise InputError(f"{topic.name} is for nodes of the run")
-        if topic.is_request:
-            raise InputError(f"{topic.name} is for persons: paramove arm enable, paramove arm stop")
+        if topic.reserved_for:
+            raise InputError(f"{topic.name} is for {topic.reserved_for}")
         if topic.name not in self._publishers:
             self._publishers[topic.name] = self._visitor.publisher(topic)
         return self._publishers[topic.name]
@@ -208,13 +194,9 @@ class Run(contextlib.AbstractContextManager["Run"]):
 
     def _step(self, timeout_s: float) -> None:
         """Waits until something can be read, a little at most, and reads it."""
-        poller = zmq.Poller()
-        for subscriber in self._subscribers.values():
-            subscriber.revive()
-            poller.register(subscriber.socket, zmq.POLLIN)
         for publisher in self._publishers.values():
             publisher.serve()
-        poller.poll(int(min(_POLL_MS, 1e3 * timeout_s)))
+        inspection.wait(self._subscribers.values(), min(_SERVE_S, timeout_s))
         for name, subscriber in self._subscribers.items():
             while (received := subscriber.receive()) is not None:
                 self._received[name].append(received)

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from paramove.bus import Topic
 from paramove.documents import InputError
 from paramove.recording.reader import read_any
+from paramove.recording.recorded_types import row_of, unknown_row
 
 
 @dataclass
@@ -33,6 +35,11 @@ class RecordedTopic:
     def type_name(self) -> str:
         """Full name of the message type."""
         return str(self.type.DESCRIPTOR.full_name)
+
+    @property
+    def row(self) -> Topic:
+        """Of the topic table, or one for a topic that no table here knows."""
+        return row_of(self.name, self.type_name) or unknown_row(self.name, self.type)
 
     @property
     def rate_hz(self) -> float:

@@ -15,7 +15,7 @@ from mcap.stream_reader import StreamReader
 from paramove.bus import topics
 from paramove.documents import InputError
 from paramove.recording.chunks import RECORD_BYTES, WRONG, allowance, records, whole
-from paramove.recording.recorded_types import type_of
+from paramove.recording.recorded_types import row_of, type_of, unknown_row
 
 MESSAGE_BYTES = 2**24
 """Of one message: as much as the largest topic allows."""
@@ -91,14 +91,15 @@ def _read(
 def _row(name: str, channel: Channel, schemas: dict[int, Schema]) -> topics.Topic | None:
     """The topic's row of the table, or one by its schema in the recording; None if that cannot be read."""
     schema = schemas.get(channel.schema_id)
-    with contextlib.suppress(KeyError, ValueError):
-        row = topics.by_name(name)
-        if schema is None or schema.name == row.type_name or row is topics.TRUTH_VIEW:
-            return row
-    if schema is not None:
+    if schema is None or name == topics.TRUTH_VIEW.name:  # the view is stored as another type
+        with contextlib.suppress(KeyError, ValueError):
+            return topics.by_name(name)
+        return None
+    row = row_of(name, schema.name)
+    if row is None:
         with contextlib.suppress(InputError):
-            return topics.Topic(name, type_of(schema), None, topics.Profile.QUEUE)
-    return None
+            row = unknown_row(name, type_of(schema))
+    return row
 
 
 def _records(file: IO[bytes], size: int) -> Iterator[McapRecord]:

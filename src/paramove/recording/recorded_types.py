@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from functools import lru_cache
 from typing import Any
 
@@ -11,7 +12,22 @@ from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 from google.protobuf.message_factory import GetMessageClass  # type: ignore[import-untyped]
 from mcap.records import Schema
 
+from paramove.bus import Topic, topics
 from paramove.documents import InputError
+
+
+def row_of(name: str, type_name: str) -> Topic | None:
+    """The topic's row of the table, if messages of this type are on it there."""
+    with contextlib.suppress(KeyError, ValueError):
+        row = topics.by_name(name)
+        if row.type_name == type_name:
+            return row
+    return None
+
+
+def unknown_row(name: str, kind: type[Any]) -> Topic:
+    """A row for a topic that no table here knows."""
+    return Topic(name, kind, None, topics.Profile.QUEUE)
 
 
 def type_of(schema: Schema) -> type[Any]:

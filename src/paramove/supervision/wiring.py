@@ -135,7 +135,7 @@ def _external_topics(launch: Launch, interfaces: Mapping[str, Interface]) -> Ite
             yield launch.error(path, f"'{publishers[name]}' publishes {name}; a topic has one publisher")
         elif name not in used:
             yield launch.error(path, f"no node of this launch file subscribes to {name!r}; {nearest(name, used)}")
-        elif used[name].truth or used[name].is_request or name == CLOCK.name or name.startswith("status/"):
+        elif used[name].reserved_for:
             yield launch.error(path, f"{name} is for nodes and persons, not for programs outside of the run")
 
 
