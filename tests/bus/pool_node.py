@@ -12,6 +12,8 @@ from paramove.msgs.rule_pb2 import Speech
 
 SUBSCRIBES = ()
 PUBLISHES = (topics.SPEECH,)
+FORK = multiprocessing.get_context("fork")
+WAITING = FORK.Semaphore(0)
 
 
 def _work(number: int) -> int:
@@ -19,14 +21,19 @@ def _work(number: int) -> int:
 
 
 def _wait(number: int) -> None:
+    WAITING.release()
     signal.pause()
 
 
 def run(bus: Bus, config: NodeConfig) -> None:
     """Publishes the processes of the pool once a tick."""
-    with multiprocessing.get_context("fork").Pool(3) as pool:
+    with FORK.Pool(3) as pool:
         pids = sorted({pid for _ in range(20) for pid in pool.map(_work, range(30), chunksize=1)})
-        pool.map_async(_wait, range(2))
+        pool.map_async(_wait, range(3), chunksize=1)
+        for _ in range(
+            3
+        ):  # an idle process has the lock of the pool's queue, and a pool ends no more if that one is killed
+            WAITING.acquire()
         child = os.fork()  # without a pool
         if child == 0:
             signal.pause()
