@@ -20,7 +20,8 @@ from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
 from paramove.cli.main import COMMANDS, build
 from paramove.cli.topic import readable
-from paramove.documents import exit_codes
+from paramove.client import connect
+from paramove.documents import DocumentError, exit_codes
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 from paramove.msgs.rule_pb2 import Rule, Rules
@@ -129,6 +130,18 @@ def test_maps_and_messages_of_a_workspace_are_printed(user_workspace: UserWorksp
     tree = user_workspace.message("Tree")(leaves={"a": 0.5}, colours={"b": 1})
     tree.nests[3].height = 2.0
     assert readable(tree) == {"leaves": {"a": 0.5}, "colours": {"b": "COLOUR_RED"}, "nests": {"3": {"height": 2.0}}}
+
+
+def test_a_wrong_table_of_the_workspace_is_reported_and_not_taken_for_an_unknown_topic(
+    run: Run, speaking: Path, user_workspace: UserWorkspace
+) -> None:
+    user_workspace.table("some/topic: {type: paramove.msgs.Gestur}")
+    for words in (("topic", "type", "some/topic"), ("topic", "pub", "some/topic")):
+        result = run(*words)
+        assert isinstance(result.exception, DocumentError)
+        assert "did you mean 'paramove.msgs.Gesture'?" in str(result.exception)
+    with connect() as client, pytest.raises(DocumentError, match=r"paramove\.msgs\.Gesture"):
+        client.latest("some/topic")
 
 
 def test_type_and_interface_show_what_a_topic_carries(run: Run, user_workspace: UserWorkspace) -> None:

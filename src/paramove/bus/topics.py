@@ -19,7 +19,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from paramove.documents import nearest
+from paramove.documents import InputError, nearest
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.msgs.body_key_points_pb2 import BodyKeyPoints
@@ -321,6 +321,20 @@ def present_names(text: str) -> str:
 def _now_called(old: str, new: str) -> str:
     warnings.warn(f"{old} is called {new} now; the next release knows the new name only", FutureWarning, stacklevel=3)
     return new
+
+
+class UnknownTopicError(InputError):
+    """There is no topic of this name; the text names the nearest ones."""
+
+
+def named(name: str) -> Topic:
+    """As `by_name`, for a name that a person has written; raises UnknownTopicError, and what `own` raises."""
+    try:
+        return by_name(name)
+    except InputError:  # of the workspace's table
+        raise
+    except (KeyError, ValueError) as error:
+        raise UnknownTopicError(str(error.args[0])) from error
 
 
 def by_name(name: str) -> Topic:

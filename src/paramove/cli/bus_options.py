@@ -37,9 +37,9 @@ def bus_folder(domain: str | None) -> Path:
 def topic_named(name: str) -> Topic:
     """Row of the table; ends the command with the nearest names if there is none."""
     try:
-        return topics.by_name(name)
-    except (KeyError, ValueError) as error:
-        raise ended(str(error.args[0]), exit_codes.USAGE) from None
+        return topics.named(name)
+    except topics.UnknownTopicError as error:
+        raise ended(str(error), exit_codes.USAGE) from None
 
 
 OLD_KEYS = {"publisher": "said by", "published": "said so far", "received": "heard"}

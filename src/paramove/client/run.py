@@ -73,7 +73,7 @@ class Run:
 
     def latest(self, topic: str, timeout_s: float = 5.0) -> Any:
         """The latest message of a topic; waits for one if there is none yet. Raises NoMessageError and InputError."""
-        row = self._subscribe(_topic(topic))
+        row = self._subscribe(topics.named(topic))
         self._step(0.0)
         self._until(lambda: row.name in self._latest, timeout_s)
         if row.name not in self._latest:
@@ -82,7 +82,7 @@ class Run:
 
     def listen(self, *names: str, seconds: float = math.inf) -> Iterator[Received]:
         """Messages of topics with their times, as they arrive within `seconds`. Raises InputError for a wrong name."""
-        rows = [self._subscribe(_topic(name)) for name in names]
+        rows = [self._subscribe(topics.named(name)) for name in names]
         until_s = time.monotonic() + seconds
         while True:
             for row in rows:
@@ -109,7 +109,7 @@ class Run:
             InputError: There is no such topic, it is for nodes or persons, or that is no message of it.
             ValueError: The message is larger than the topic allows.
         """
-        row = _topic(topic)
+        row = topics.named(topic)
         message = message_of(row.type, content) if isinstance(content, str | Mapping) else content
         publisher = self.offer(row)
         self.wait_for_subscribers([publisher], wait_s)
@@ -203,10 +203,3 @@ class Run:
                 self._latest[name] = received
         if topics.CLOCK.name in self._latest:
             self._now_ns = self._latest[topics.CLOCK.name].message.time_ns
-
-
-def _topic(name: str) -> Topic:
-    try:
-        return topics.by_name(name)
-    except (KeyError, ValueError) as error:
-        raise InputError(str(error.args[0])) from error
