@@ -192,7 +192,7 @@ def test_pub_publishes_once_with_a_subscriber(run: Run, speaking: Path) -> None:
         (("relocation/goal", "{to: {x: 1e300}}"), exit_codes.CONFIGURATION, "to.x is 1e+300"),
         (("speech", "{text: hello}", "--wait", "0.1"), exit_codes.FAILURE, "nobody subscribed"),
         (("operator/arm", "{armed: true, by_person: true}"), exit_codes.CONFIGURATION, "paramove arm enable"),
-        (("operator/stop", "{}"), exit_codes.CONFIGURATION, "paramove arm stop"),
+        (("operator/stop", "{}"), exit_codes.CONFIGURATION, "paramove arm estop"),
         (("clock", "{}"), exit_codes.CONFIGURATION, "for nodes"),
         (("truth/state", "{}"), exit_codes.CONFIGURATION, "for nodes"),
         (("status/camera", "{}"), exit_codes.CONFIGURATION, "for nodes"),

@@ -97,7 +97,7 @@ class Topic:
         By the names of topic and type: a recording, and a workspace, may have classes of their own.
         """
         if self.type_name in _OF_PERSONS:
-            return "persons: paramove arm enable, paramove arm stop"
+            return "persons: paramove arm enable, paramove arm estop"
         if self.truth or self.name.startswith(_STATUS_PREFIX) or self.type_name in _OF_NODES:
             return "nodes of the run"
         return ""
