@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import re
 import stat
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.message_factory import GetMessageClass
 
-from paramove.bus import own_messages, topics
+from paramove.bus import changed_field, own_messages, schema_hash, topics
 from paramove.bus.topics import Profile
 from paramove.documents import DocumentError, InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose
-from paramove.recording import RecordingWriter, read
+from paramove.recording import RecordingWriter, contents, read
 from tests.own_workspace import EVERYTHING, UserWorkspace
 
 LAMP = "message Lamp { bool is_on = 1; }\n"
@@ -35,6 +39,65 @@ def test_a_topic_of_the_workspace_is_one_of_all_topics(user_workspace: UserWorks
     assert brightness not in topics.RECORDED
     assert truth.truth
     assert lamp.type(is_on=True).SerializeToString() == b"\x08\x01"
+
+
+@pytest.mark.parametrize(
+    ("rows", "other"),
+    [
+        (("lamp/state: {type: foxglove.Log}", "lamp_state: {type: foxglove.Log}"), "lamp/state"),
+        (("camera_image: {type: foxglove.Log}",), "camera/image"),
+    ],
+)
+def test_two_topics_that_a_node_would_call_the_same_are_rejected(user_workspace, rows, other):
+    user_workspace.table(*rows)
+    with pytest.raises(DocumentError, match=f"as they call '{other}'"):
+        topics.own()
+
+
+NOW = "{bool is_on = 1; double watt = 2; Kind kind = 3;} enum Kind {NONE = 0; LED = 1;}"
+
+
+@pytest.mark.parametrize(
+    ("former", "what"),
+    [
+        (NOW.replace("= 1; double", "= 2; double").replace("watt = 2", "watt = 1"), "'bool is_on = 2' is 'double watt"),
+        (NOW.replace("double watt", "float watt"), "'float watt = 2' is 'double watt = 2' now"),
+        (NOW.replace("watt", "power_w"), "'double power_w = 2' is 'double watt = 2' now"),
+        (NOW.replace("bool is_on", "repeated bool is_on"), "'repeated bool is_on = 1' is 'bool is_on = 1' now"),
+        (NOW.replace("LED = 1", "LED = 2"), "'LED = 2' is 'LED = 1' now"),
+        (NOW.replace("double watt = 2;", ""), ""),
+        (NOW.replace("Kind kind", "double spare = 9; Kind kind"), ""),
+    ],
+)
+def test_a_message_with_a_changed_field_is_another_type_on_the_bus_and_read_as_it_was_recorded(
+    user_workspace, tmp_path, former, what
+):
+    recorded = tmp_path / "changed.mcap"
+    user_workspace.schema(f"message Lamp {former}")
+    user_workspace.table("lamp: {type: {package}.Lamp}")
+    row = topics.by_name("lamp")
+    with RecordingWriter(recorded, "test") as writer:
+        writer.write("lamp", row.type(is_on=[True] if "repeated" in former else True), 0, 0, 1)
+    present = replace(row, type=compiled(user_workspace, f"message Lamp {NOW}"))
+    change = changed_field(present.type.DESCRIPTOR, row.type.DESCRIPTOR)
+    assert change.startswith(what)
+    assert bool(change) == bool(what)
+    assert schema_hash(present.type) != schema_hash(row.type)
+    topics._own_by_folder[Path.cwd()] = (present,)
+    (one,) = read(recorded)
+    assert one.message.is_on in (True, [True])
+    assert (type(one.message) is present.type) == (not what)
+    (topic,) = contents(recorded)
+    assert topic.change == change
+
+
+def compiled(user_workspace: UserWorkspace, text: str) -> Any:
+    """Class of the message Lamp of a schema that another process would compile."""
+    user_workspace.schema(text)
+    (file,) = own_messages._compiled(user_workspace.root).file
+    pool = DescriptorPool()
+    pool.Add(file)
+    return GetMessageClass(pool.FindMessageTypeByName(f"{user_workspace.package}.Lamp"))
 
 
 def test_without_a_table_there_are_the_topics_of_the_library(user_workspace: UserWorkspace) -> None:

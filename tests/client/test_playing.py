@@ -1,6 +1,7 @@
 """A recording played on a bus: its messages, at their distances, in the time of now; nothing that arms or stops."""
 
 import os
+from dataclasses import replace
 
 import pytest
 from typer.testing import CliRunner
@@ -98,6 +99,26 @@ def test_a_topic_of_another_workspace_is_read_and_played_by_its_recorded_schema(
         found = received_while(folder, [own], lambda: play(run, path, wait_s=30.0))
     assert found[0].message.height == 2.0
     assert found[0].message.at.ToNanoseconds() == found[0].published_ns
+
+
+def test_messages_of_a_changed_type_or_too_large_for_the_topic_are_not_played(folder, recording, monkeypatch):
+    small = replace(topics.SPEECH, max_bytes=1)
+    monkeypatch.setitem(topics._LIBRARY_BY_NAME, "speech", small)
+    with Run(folder) as run, pytest.raises(InputError, match="the topic allows 1; raise its max_bytes"):
+        play(run, recording, ["speech"], wait_s=0.0)
+    monkeypatch.setitem(topics._LIBRARY_BY_NAME, "speech", replace(topics.GESTURES, name="speech"))
+    with Run(folder) as run, pytest.raises(InputError, match=r"Speech is paramove\.msgs\.Gesture now"):
+        play(run, recording, ["speech"], wait_s=0.0)
+
+
+def test_a_recording_without_messages_is_told_from_a_damaged_one(tmp_path):
+    empty = tmp_path / "empty.mcap"
+    RecordingWriter(empty, "test").close()
+    with pytest.raises(InputError, match="has no messages"):
+        contents(empty)
+    empty.write_bytes(empty.read_bytes()[:-20])
+    with pytest.raises(InputError, match="paramove recover"):
+        contents(empty)
 
 
 def test_bag_info_lists_the_topics(recording):

@@ -3,11 +3,12 @@
 import os
 import threading
 
+import numpy as np
 import pytest
 
 import paramove
-from paramove.bus import Bus, BusSettings, LockstepBarrier, TopicTakenError, topics
-from paramove.client import NoMessageError, connect, message_of
+from paramove.bus import Bus, BusSettings, BusVisitor, LockstepBarrier, TopicTakenError, topics
+from paramove.client import NoMessageError, NotConnectedError, Run, connect, message_of
 from paramove.documents import InputError
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import Speech
@@ -81,6 +82,63 @@ def test_a_message_may_be_written_as_yaml_or_json():
         message_of(RelocationGoal, {"from": {"x": float("nan")}})
     with pytest.raises(InputError, match="the message"):
         message_of(RelocationGoal, "{kind: [")
+
+
+EVERY_KIND = """
+message All {
+  bytes data = 1;
+  repeated bytes parts = 2;
+  map<string, bytes> named = 3;
+  repeated double x = 4;
+  All next = 5;
+}
+"""
+
+
+def test_bytes_and_arrays_are_taken_as_they_are(user_workspace):
+    kind = user_workspace.message("All", EVERY_KIND)
+    fields = {"data": b"\xff\x00raw", "parts": [b"a", bytearray(b"b")], "named": {"c": b"d"}, "x": np.array([1.0, 2.0])}
+    made = message_of(kind, {**fields, "next": {"data": "cmF3"}})
+    assert (made.data, list(made.parts), dict(made.named)) == (b"\xff\x00raw", [b"a", b"b"], {"c": b"d"})
+    assert (list(made.x), made.next.data) == ([1.0, 2.0], b"raw")
+
+
+@pytest.mark.parametrize("text", ["***", "###", "hello"])
+def test_a_text_that_is_no_base64_is_no_bytes(user_workspace, text):
+    kind = user_workspace.message("All", EVERY_KIND)
+    with pytest.raises(InputError, match=r"next\.data"):
+        message_of(kind, {"next": {"data": text}})
+
+
+def test_a_mapping_that_contains_itself_is_rejected(user_workspace):
+    kind = user_workspace.message("All", EVERY_KIND)
+    fields: dict = {"x": [1.0]}
+    fields["next"] = fields
+    with pytest.raises(InputError, match="more than 100 deep"):
+        message_of(kind, fields)
+
+
+def test_topics_may_be_given_as_rows_and_nothing_else_but_names(node):
+    with connect() as run:
+        assert run.latest(topics.RULES, 30.0).frame == "table"
+        with pytest.raises(InputError, match="expected the name of a topic"):
+            run.latest(3)
+        with pytest.raises(ValueError, match="nan"):
+            next(run.listen("rules", seconds=float("nan")))
+
+
+def test_a_stop_that_no_gate_answers_and_a_time_that_does_not_come_are_no_answers(folder):
+    with BusVisitor(folder, "world") as world:
+        world.publisher(topics.CLOCK)
+        with connect() as run:
+            with pytest.raises(NoMessageError, match="the arm may still move"):
+                run.stop(0.1)
+            with pytest.raises(NoMessageError, match="clock"):
+                _ = run.now_ns
+    with pytest.raises(NotConnectedError, match="with paramove"):
+        run.latest("rules")
+    with pytest.raises(NotConnectedError):
+        Run(folder).idle(0.1)
 
 
 def test_in_simulated_time_messages_have_the_time_of_the_run(folder):

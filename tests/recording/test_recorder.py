@@ -18,6 +18,7 @@ from paramove.bus.recorded import RecordedBus
 from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Received
 from paramove.msgs.rule_pb2 import Speech
+from paramove.msgs.safety_state_pb2 import StopRequest
 from paramove.recording import recorder
 from paramove.recording.parts import PartedRecording
 from paramove.recording.reader import read
@@ -48,6 +49,28 @@ def test_a_single_message_is_in_the_file_although_nothing_follows_it(tmp_path: P
         recording.keep(speech(1))
         until(lambda: numbers_in(tmp_path / "run.mcap.part") == [1], "the message is in the file")
     assert numbers_in(tmp_path / "run.mcap") == [1]
+
+
+@pytest.mark.parametrize(
+    ("published_s", "resent", "recorded_s"),
+    [
+        (59_000.0, False, 95.0),  # of a terminal, by its monotonic clock, while time is simulated
+        (2.0, False, 95.0),  # of a container that was started later
+        (94.5, False, 94.5),
+        (2.0, True, 2.0),  # latched, from before the recorder was started again
+    ],
+)
+def test_a_request_of_a_sender_with_another_clock_is_recorded_when_it_arrived(
+    tmp_path, published_s, resent, recorded_s
+):
+    bus = RecordedBus()
+    bus.now_ns = 95 * 10**9
+    published_ns = round(published_s * 1e9)
+    request = Received(topics.OPERATOR_STOP, StopRequest(), published_ns, published_ns, 1, resent)
+    with Recorder(bus, tmp_path / "run.mcap", "a test") as recording:
+        recording.keep(request)
+    (one,) = read(tmp_path / "run.mcap")
+    assert (one.log_ns, one.publish_ns) == (recorded_s * 1e9, recorded_s * 1e9)
 
 
 @pytest.mark.parametrize("umask", [0o000, 0o022, 0o277])

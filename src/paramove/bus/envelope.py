@@ -151,8 +151,10 @@ def unpack(header: bytes, payload: bytes, schema: int, max_bytes: int) -> Envelo
 
 def _schema_message(received: int, expected: int) -> str:
     """Names both sides of a schema mismatch."""
-    names = [type_of_hash(value) or "a type unknown here" for value in (received, expected)]
+    unknown = "unknown here, or defined otherwise when the publisher was started"
+    names = [type_of_hash(value) or unknown for value in (received, expected)]
     return (
         f"schema hash is {received:#018x} ({names[0]}), the topic carries {expected:#018x} ({names[1]}); "
-        "correct the publisher, or run every process from the same installation"
+        "correct the publisher, run every process from the same installation, and start all of them again after a "
+        "change of a message"
     )

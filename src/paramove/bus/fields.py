@@ -6,11 +6,18 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from typing import Any
 
-from google.protobuf.descriptor import Descriptor, FieldDescriptor  # type: ignore[import-untyped]
+from google.protobuf.descriptor import Descriptor, EnumDescriptor, FieldDescriptor  # type: ignore[import-untyped]
 from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto  # type: ignore[import-untyped]
 
+OWN_FOLDER = "msgs"
+"""Of a workspace: with its own messages and topics."""
 _TIMESTAMP = "google.protobuf.Timestamp"
 FieldTest = Callable[[FieldDescriptor], bool]
+
+
+def is_own(descriptor: Descriptor) -> bool:
+    """Whether a message type is of a workspace, not of a library."""
+    return str(descriptor.file.name).startswith(f"{OWN_FOLDER}/")
 
 
 def is_map(field: FieldDescriptor) -> bool:
@@ -77,8 +84,48 @@ def any_field(descriptor: Descriptor, test: FieldTest) -> bool:
     return False
 
 
-def written_out(descriptor: Descriptor) -> str:
-    """A message type, and those in it but Google's, as in a `.proto` file."""
+def _changed_value(present: EnumDescriptor, former: EnumDescriptor) -> str:
+    """What a value of an enumeration is now; "" if each has its number still."""
+    for value in former.values:
+        known = present.values_by_number.get(value.number) or present.values_by_name.get(value.name)
+        if known is not None and (known.name, known.number) != (value.name, value.number):
+            return f"'{value.name} = {value.number}' is '{known.name} = {known.number}' now"
+    return ""
+
+
+def is_of_no_google(descriptor: Descriptor) -> bool:
+    """Whether a message type is another than Google's, which everybody knows."""
+    return not str(descriptor.full_name).startswith("google.")
+
+
+def changed_field(present: Descriptor, former: Descriptor) -> str:
+    """What a field is now that messages of the former definition would be misread by; "" if they can be read.
+
+    A field that only one of the two has is no change: it is left out, or absent.
+    """
+    seen = set[str]()
+    waiting = [(present, former)]
+    while waiting:
+        new, old = waiting.pop()
+        if new.full_name in seen:
+            continue
+        seen.add(new.full_name)
+        for field in old.fields:
+            known = new.fields_by_number.get(field.number) or new.fields_by_name.get(field.name)
+            if known is None:
+                continue
+            if _written(known) != _written(field):
+                return f"'{_written(field)}' is '{_written(known)}' now"
+            if known.enum_type is not None and (changed := _changed_value(known.enum_type, field.enum_type)):
+                return changed
+            part, old_part = value_of(known).message_type, value_of(field).message_type
+            if part is not None and is_own(part):
+                waiting.append((part, old_part))
+    return ""
+
+
+def written_out(descriptor: Descriptor, only: Callable[[Descriptor], bool] = is_of_no_google) -> str:
+    """A message type, and those in it that pass `only`, as in a `.proto` file."""
     seen = {descriptor.full_name}
     blocks = []
     waiting = [descriptor]
@@ -87,7 +134,7 @@ def written_out(descriptor: Descriptor) -> str:
         blocks.append(_block(one))
         for field in one.fields:
             part = value_of(field).message_type
-            if part is not None and part.full_name not in seen and not part.full_name.startswith("google."):
+            if part is not None and part.full_name not in seen and only(part):
                 seen.add(part.full_name)
                 waiting.append(part)
     return "\n\n".join(blocks)
@@ -101,12 +148,21 @@ def _block(descriptor: Descriptor) -> str:
         numbers = " ".join(f"{value.name} = {value.number};" for value in enumeration.values)
         lines.append(f"  enum {name} {{ {numbers} }}")
     for field in descriptor.fields:
-        choice = field.containing_oneof
-        is_optional = choice is not None and len(choice.fields) == 1 and choice.name == f"_{field.name}"
-        kind = "optional " if is_optional else "repeated " if is_repeated(field) and not is_map(field) else ""
-        of_choice = "" if choice is None or is_optional else f"  // one of {choice.name}"
-        lines.append(f"  {kind}{_type_name(field)} {field.name} = {field.number};{of_choice}")
+        choice = None if _is_optional(field) else field.containing_oneof
+        of_choice = "" if choice is None else f"  // one of {choice.name}"
+        lines.append(f"  {_written(field)};{of_choice}")
     return "\n".join([*lines, "}"])
+
+
+def _written(field: FieldDescriptor) -> str:
+    """A field as in a `.proto` file, such as `repeated double angle = 1`."""
+    kind = "optional " if _is_optional(field) else "repeated " if is_repeated(field) and not is_map(field) else ""
+    return f"{kind}{_type_name(field)} {field.name} = {field.number}"
+
+
+def _is_optional(field: FieldDescriptor) -> bool:
+    choice = field.containing_oneof
+    return choice is not None and len(choice.fields) == 1 and choice.name == f"_{field.name}"
 
 
 def _type_name(field: FieldDescriptor) -> str:

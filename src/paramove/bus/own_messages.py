@@ -24,10 +24,10 @@ from typing import Any
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory  # type: ignore[import-untyped]
 from platformdirs import user_cache_path
 
+from paramove.bus.fields import OWN_FOLDER
 from paramove.documents import DocumentError, InputError, Position, raise_any, read_text, replacing
 from paramove.workspace import Workspace
 
-FOLDER = "msgs"
 _LIBRARIES = {
     "foxglove/": "foxglove_schemas_protobuf",
     "paramove/msgs/": "paramove.msgs",
@@ -62,7 +62,7 @@ def message_types() -> dict[str, type[Any]]:
 
 def _sources(root: Path) -> list[Path]:
     """Its `.proto` files but those of the library, which lie in the same folder of a clone."""
-    own = (path for path in (root / FOLDER).glob("*.proto") if _code_of(f"paramove/msgs/{path.name}") is None)
+    own = (path for path in (root / OWN_FOLDER).glob("*.proto") if _code_of(f"paramove/msgs/{path.name}") is None)
     return sorted(own)
 
 
@@ -76,7 +76,7 @@ def _code_of(file: str) -> Any:
 
 
 def _compiled(root: Path) -> descriptor_pb2.FileDescriptorSet:
-    texts = {f"{FOLDER}/{path.name}": read_text(path, "schema of messages") for path in _sources(root)}
+    texts = {f"{OWN_FOLDER}/{path.name}": read_text(path, "schema of messages") for path in _sources(root)}
     kept = user_cache_path("paramove") / "messages" / f"{_digest(texts)}.binpb"
     with contextlib.suppress(OSError):
         return descriptor_pb2.FileDescriptorSet.FromString(kept.read_bytes())
@@ -107,22 +107,22 @@ def _run_protoc(root: Path, files: Iterable[str]) -> bytes:
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False)
         except subprocess.TimeoutExpired as error:
-            raise InputError(f"protoc needs more than {_TIMEOUT_S:g} s for {root / FOLDER}") from error
+            raise InputError(f"protoc needs more than {_TIMEOUT_S:g} s for {root / OWN_FOLDER}") from error
         if done.returncode == 0:
             return result.read_bytes()
     if "No module named" in done.stderr:
         raise InputError(
-            f"messages of {root / FOLDER} are compiled by protoc: install it with `pip install grpcio-tools`"
+            f"messages of {root / OWN_FOLDER} are compiled by protoc: install it with `pip install grpcio-tools`"
         )
     raise_any([_finding(root, line) for line in done.stderr.splitlines() if line.strip()])
-    raise InputError(f"protoc ended with exit code {done.returncode} for {root / FOLDER}")
+    raise InputError(f"protoc ended with exit code {done.returncode} for {root / OWN_FOLDER}")
 
 
 def _finding(root: Path, line: str) -> DocumentError:
     """A line of protoc."""
     found = _PROTOC_LINE.fullmatch(line)
     if found is None:
-        return DocumentError(Position(str(root / FOLDER)), line)
+        return DocumentError(Position(str(root / OWN_FOLDER)), line)
     position = Position(str(root / found["file"]), int(found["line"] or 0), int(found["column"] or 0))
     return DocumentError(position, found["message"])
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from paramove.bus.own_messages import library_messages, own_messages
-from paramove.bus.topics import IMAGE_BYTES, NAME, OWN_TABLE, RESERVED_TYPES, Profile, Topic
+from paramove.bus.topics import IMAGE_BYTES, NAME, OWN_TABLE, RESERVED_TYPES, Profile, Topic, constant_of
 from paramove.documents import checked, nearest, raise_any, read_document
 from paramove.workspace import Workspace
 
@@ -37,7 +37,9 @@ class TopicRow(BaseModel):
         description="every message counts (queue), a late joiner gets the last one too (latched), or "
         "only the latest is of use",
     )
-    frame: str = Field(default="", description="coordinate frame of spatial content")
+    frame: Annotated[str, Field(pattern=r"^[\w/]*$", max_length=100)] = Field(
+        default="", description="coordinate frame of spatial content"
+    )
     recorded: bool | None = Field(default=None, description="whether the recorder stores it; null: unless it is truth")
     max_bytes: int = Field(default=2**16, ge=1, le=IMAGE_BYTES, description="largest message")
     limit_hz: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = Field(
@@ -78,9 +80,10 @@ def _topics_of(layer: Path, library: Mapping[str, Topic]) -> list[Topic]:
     if any(row.type not in types for row in table.topics.values()):
         types = library_messages() | types
     found, faults = [], []
+    taken = {constant_of(name): name for name in library}
     for name, row in table.topics.items():
         message = types.get(row.type)
-        fault = _fault(name, row, library)
+        fault = _fault(name, row, library) or _same_constant(name, taken)
         if fault:
             faults.append(document.error(("topics", name), fault))
         if message is None:
@@ -107,6 +110,15 @@ def _fault(name: str, row: TopicRow, library: Mapping[str, Topic]) -> str:
     if is_truth and row.recorded:
         return f"'{name}' is ground truth, which only the simulation and evaluators know: it is not recorded"
     return ""
+
+
+def _same_constant(name: str, taken: dict[str, str]) -> str:
+    """Which other topic a node would call the same; "" if none, and then the name is taken from now on."""
+    constant = constant_of(name)
+    other = taken.setdefault(constant, name)
+    if other == name:
+        return ""
+    return f"'{name}': nodes would call it topics.{constant}, as they call '{other}'; give it another name"
 
 
 def _topic(name: str, row: TopicRow, message: type[Any]) -> Topic:

@@ -327,8 +327,12 @@ class UnknownTopicError(InputError):
     """There is no topic of this name; the text names the nearest ones."""
 
 
-def named(name: str) -> Topic:
-    """As `by_name`, for a name that a person has written; raises UnknownTopicError, and what `own` raises."""
+def named(name: str | Topic) -> Topic:
+    """As `by_name`, for a name that a person has written, or a row; raises UnknownTopicError, and what `own` raises."""
+    if isinstance(name, Topic):
+        return name
+    if not isinstance(name, str):
+        raise UnknownTopicError(f"expected the name of a topic, such as 'arm/joint_states', found {name!r:.80}")
     try:
         return by_name(name)
     except InputError:  # of the workspace's table

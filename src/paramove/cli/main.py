@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 
 from paramove.cli.completions import typed_words
-from paramove.documents import UNAVAILABLE, InputError
+from paramove.documents import FULL_DISK, TEMPORARY, UNAVAILABLE, InputError
 from paramove.linear_algebra_threads import use_one_thread
 from paramove.terminal_size import drop_unusable_sizes
 
@@ -108,6 +108,11 @@ def main() -> None:
     except InputError as error:  # of a command that does not handle it
         sys.stderr.write(f"{error}\n")
         sys.exit(error.exit_code)
+    except OSError as error:
+        if error.errno not in FULL_DISK:
+            raise
+        sys.stderr.write(f"{error.filename or 'the output'} cannot be written: {error.strerror}\n")
+        sys.exit(TEMPORARY)
 
 
 if __name__ == "__main__":

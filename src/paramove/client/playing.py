@@ -47,7 +47,8 @@ def play(
         How many messages were published.
 
     Raises:
-        InputError: There is no such recording or topic, or a topic may not be played.
+        InputError: There is no such recording or topic, a topic may not be played, or its messages are none of the
+            topic's any more.
         TopicTakenError: Somebody publishes one of the topics.
     """
     rows = _rows(path, contents(path), names)
@@ -83,4 +84,17 @@ def _rows(path: Path, recorded: Sequence[RecordedTopic], names: Collection[str])
         raise InputError(f"not played, as nodes or persons alone publish them: {others}")
     if not playable:
         raise InputError(f"{path} has no topic that is played")
+    for row in playable:
+        fault = _fault(row, known[row.name])
+        if fault:
+            raise InputError(f"{path}: {row.name} cannot be played: {fault}")
     return playable
+
+
+def _fault(row: Topic, recorded: RecordedTopic) -> str:
+    """Why the messages recorded of a topic cannot be published on it; "" if they can."""
+    if recorded.change:
+        return f"{recorded.change}, and its subscribers would misread it; leave it out by --topics, or undo the change"
+    if recorded.most_bytes > row.max_bytes:
+        return f"a message has {recorded.most_bytes} bytes, the topic allows {row.max_bytes}; raise its max_bytes"
+    return ""

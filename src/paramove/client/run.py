@@ -17,12 +17,17 @@ from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.operator import stop_arm
 
 _SERVE_S = 0.02
+_CLOCK_S = 2.0
 _REPEAT_S = 0.5
 _LAST_STATES = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED)
 
 
 class NoMessageError(RuntimeError):
-    """Nothing came on a topic in time; the text names the topic and its publisher."""
+    """Nothing came on a topic in time, such as the answer to a stop; the text names the topic and its publisher."""
+
+
+class NotConnectedError(RuntimeError):
+    """A connection is used before or after its `with` block."""
 
 
 def connect(domain: str | None = None, name: str = "client") -> Run:
@@ -52,9 +57,11 @@ class Run:
         self._received: dict[str, deque[Received]] = {}
         self._latest: dict[str, Received] = {}
         self._now_ns = 0
+        self._is_simulated = False
+        self._open_visitor: BusVisitor | None = None
 
     def __enter__(self) -> Self:
-        self._visitor = BusVisitor(self._folder, self._name)
+        self._open_visitor = BusVisitor(self._folder, self._name)
         self._is_simulated = inspection.publisher_of(self._folder, topics.CLOCK).alive
         if self._is_simulated:
             self._subscribe(topics.CLOCK)
@@ -62,16 +69,29 @@ class Run:
 
     def __exit__(self, *_: object) -> None:
         self._visitor.close()
+        self._open_visitor = None
 
     @property
     def now_ns(self) -> int:
-        """Time of the run: simulated, or this host's monotonic clock."""
+        """Time of the run: simulated, or this host's monotonic clock.
+
+        Raises NoMessageError if simulated time is not known and does not come within 2 s.
+        """
         if not self._is_simulated:
             return time.monotonic_ns()
         self._step(0.0)
+        self._until(lambda: topics.CLOCK.name in self._latest, _CLOCK_S)
+        if topics.CLOCK.name not in self._latest:
+            raise NoMessageError(inspection.why_nothing_came(self._folder, topics.CLOCK, _CLOCK_S))
         return self._now_ns
 
-    def latest(self, topic: str, timeout_s: float = 5.0) -> Any:
+    @property
+    def _visitor(self) -> BusVisitor:
+        if self._open_visitor is None:
+            raise NotConnectedError("not connected: use it within `with paramove.connect() as run:`")
+        return self._open_visitor
+
+    def latest(self, topic: str | Topic, timeout_s: float = 5.0) -> Any:
         """The latest message of a topic; waits for one if there is none yet. Raises NoMessageError and InputError."""
         row = self._subscribe(topics.named(topic))
         self._step(0.0)
@@ -80,8 +100,13 @@ class Run:
             raise NoMessageError(inspection.why_nothing_came(self._folder, row, timeout_s))
         return self._latest[row.name].message
 
-    def listen(self, *names: str, seconds: float = math.inf) -> Iterator[Received]:
-        """Messages of topics with their times, as they arrive within `seconds`. Raises InputError for a wrong name."""
+    def listen(self, *names: str | Topic, seconds: float = math.inf) -> Iterator[Received]:
+        """Messages of topics with their times, as they arrive within `seconds`.
+
+        Raises InputError for a wrong name, ValueError if `seconds` is no number.
+        """
+        if math.isnan(seconds):
+            raise ValueError("seconds: a number expected, found nan")
         rows = [self._subscribe(topics.named(name)) for name in names]
         until_s = time.monotonic() + seconds
         while True:
@@ -93,7 +118,7 @@ class Run:
                 return
             self._step(left_s)
 
-    def publish(self, topic: str, content: Any, wait_s: float = 2.0) -> bool:
+    def publish(self, topic: str | Topic, content: Any, wait_s: float = 2.0) -> bool:
         """Publishes a message, captured now, on a topic that no node publishes.
 
         Args:
@@ -108,6 +133,7 @@ class Run:
             TopicTakenError: Somebody publishes the topic.
             InputError: There is no such topic, it is for nodes or persons, or that is no message of it.
             ValueError: The message is larger than the topic allows.
+            NoMessageError: The run's simulated time is not known.
         """
         row = topics.named(topic)
         message = message_of(row.type, content) if isinstance(content, str | Mapping) else content
@@ -166,9 +192,19 @@ class Run:
         state = RelocationStatus.State.Name(latest.state).removeprefix("STATE_").lower()
         raise NoMessageError(f"goal {message.id!r} has not ended within {timeout_s:g} s; its state is {state}")
 
-    def stop(self, timeout_s: float = 2.0) -> SafetyState | None:
-        """Stops the arm; returns the gate's answer, None if there was none in time."""
-        return stop_arm(self._folder, self._name, timeout_s)
+    def stop(self, timeout_s: float = 2.0) -> SafetyState:
+        """Stops the arm; returns the gate's answer.
+
+        Raises NoMessageError if there was none in time: then nobody knows that the arm stops. TopicTakenError as
+        `stop_arm` does.
+        """
+        answer = stop_arm(self._folder, self._name, timeout_s)
+        if answer is None:
+            raise NoMessageError(
+                f"no safety gate has answered the stop within {timeout_s:g} s: the arm may still move; use the switch "
+                "of the motors' power"
+            )
+        return answer
 
     def _subscribe(self, topic: Topic) -> Topic:
         if topic.name not in self._subscribers:
@@ -193,7 +229,8 @@ class Run:
             self._step(left_s)
 
     def _step(self, timeout_s: float) -> None:
-        """Waits until something can be read, a little at most, and reads it."""
+        """Waits until something can be read, a little at most, and reads it; raises NotConnectedError."""
+        _ = self._visitor
         for publisher in self._publishers.values():
             publisher.serve()
         inspection.wait(self._subscribers.values(), min(_SERVE_S, timeout_s))

@@ -11,8 +11,10 @@ from .checking import keys_at as keys_at
 from .exit_codes import FAILURE as FAILURE
 from .exit_codes import NEVER_RESTARTED as NEVER_RESTARTED
 from .exit_codes import OK as OK
+from .exit_codes import TEMPORARY as TEMPORARY
 from .exit_codes import UNAVAILABLE as UNAVAILABLE
 from .exit_codes import describe as describe
+from .files import FULL_DISK as FULL_DISK
 from .files import read_text as read_text
 from .files import size_of as size_of
 from .files import unreadable as unreadable

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import stat
 from pathlib import Path
 
 from paramove.documents.input_error import InputError
 
+FULL_DISK = frozenset({errno.ENOSPC, errno.EDQUOT})
+"""Numbers of errors of a disk that is full, and of a user's part of it."""
 MEBIBYTE = 2**20
 TEXT_BYTES = 512 * MEBIBYTE
 """Limit for a text with numbers, such as BVH: an hour of 60 joints at 120 Hz has 250 MB."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from paramove.bus import Topic
+from paramove.bus import Topic, topics
 from paramove.documents import InputError
+from paramove.recording.damage import MAGIC
 from paramove.recording.reader import read_any
-from paramove.recording.recorded_types import row_of, unknown_row
+from paramove.recording.recorded_types import change_of, recorded_row
 
 
 @dataclass
@@ -21,7 +24,7 @@ class RecordedTopic:
         type: Class of its messages.
         messages: How many.
         first_ns, last_ns: Times of the first and the last, by the clock of the run.
-        bytes_total: Of all messages, encoded again.
+        bytes_total, most_bytes: Of all messages, and of the largest, encoded again.
     """
 
     name: str
@@ -30,6 +33,7 @@ class RecordedTopic:
     first_ns: int
     last_ns: int
     bytes_total: int
+    most_bytes: int
 
     @property
     def type_name(self) -> str:
@@ -38,8 +42,23 @@ class RecordedTopic:
 
     @property
     def row(self) -> Topic:
-        """Of the topic table, or one for a topic that no table here knows."""
-        return row_of(self.name, self.type_name) or unknown_row(self.name, self.type)
+        """Of the topic table, if it has the topic with this type; otherwise one of this name and type."""
+        known = self._known
+        return known if known is not None and known.type is self.type else recorded_row(self.name, self.type)
+
+    @property
+    def change(self) -> str:
+        """What the topic table has another now, so that these messages are none of the topic's; "" if nothing."""
+        known = self._known
+        if known is None or known.type is self.type:
+            return ""
+        return change_of(known, self.type)
+
+    @property
+    def _known(self) -> Topic | None:
+        with contextlib.suppress(KeyError, ValueError):
+            return topics.by_name(self.name)
+        return None
 
     @property
     def rate_hz(self) -> float:
@@ -60,11 +79,17 @@ def contents(path: Path) -> list[RecordedTopic]:
         size = one.message.ByteSize()
         topic = found.get(one.topic)
         if topic is None:
-            found[one.topic] = RecordedTopic(one.topic, type(one.message), 1, one.log_ns, one.log_ns, size)
+            found[one.topic] = RecordedTopic(one.topic, type(one.message), 1, one.log_ns, one.log_ns, size, size)
             continue
         topic.messages += 1
         topic.last_ns = one.log_ns
         topic.bytes_total += size
+        topic.most_bytes = max(topic.most_bytes, size)
     if not found:
-        raise InputError(f"{path}: nothing in it can be read; `paramove recover` rebuilds what can be")
+        with path.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.seek(max(0, size - len(MAGIC)))
+            is_whole = size > len(MAGIC) and file.read() == MAGIC
+        why = "it has no messages" if is_whole else "nothing in it can be read; `paramove recover` rebuilds what can be"
+        raise InputError(f"{path}: {why}")
     return list(found.values())

@@ -15,7 +15,7 @@ from mcap.stream_reader import StreamReader
 from paramove.bus import topics
 from paramove.documents import InputError
 from paramove.recording.chunks import RECORD_BYTES, WRONG, allowance, records, whole
-from paramove.recording.recorded_types import row_of, type_of, unknown_row
+from paramove.recording.recorded_types import row_of
 
 MESSAGE_BYTES = 2**24
 """Of one message: as much as the largest topic allows."""
@@ -54,8 +54,11 @@ def read(path: Path, only: Collection[str] = (), raising: type[InputError] = Inp
         FileNotFoundError: There is no such file.
         InputError: A message is not of its topic's type, or too large.
         KeyError: The file has a topic that is not in the topic table.
+
+    A message type of the workspace whose fields have changed since is that of the recording: the fields have the names
+    that they had then.
     """
-    yield from _read(path, only, raising, None)
+    yield from _read(path, only, raising, must_be_known=True)
 
 
 def read_any(path: Path, only: Collection[str] = (), raising: type[InputError] = InputError) -> Iterator[Recorded]:
@@ -63,23 +66,23 @@ def read_any(path: Path, only: Collection[str] = (), raising: type[InputError] =
 
     Channels of other encodings than protobuf are left out.
     """
-    yield from _read(path, only, raising, {})
+    yield from _read(path, only, raising, must_be_known=False)
 
 
-def _read(
-    path: Path, only: Collection[str], raising: type[InputError], schemas: dict[int, Schema] | None
-) -> Iterator[Recorded]:
-    """The messages; with `schemas`, which are collected there, also those of topics that no table here knows."""
+def _read(path: Path, only: Collection[str], raising: type[InputError], must_be_known: bool) -> Iterator[Recorded]:
     channels: dict[int, topics.Topic] = {}
+    schemas: dict[int, Schema] = {}
     with path.open("rb") as file:
         for record in _records(file, path.stat().st_size):
-            if isinstance(record, Schema) and schemas is not None:
+            if isinstance(record, Schema):
                 schemas[record.id] = record
             elif isinstance(record, Channel):
                 name = topics.OLD_NAMES.get(record.topic, record.topic)
                 if only and name not in only and record.topic not in only:
                     continue
-                topic = topics.by_name(name) if schemas is None else _row(name, record, schemas)
+                if must_be_known:
+                    topics.by_name(name)
+                topic = _row(name, schemas.get(record.schema_id))
                 if topic is not None:
                     channels[record.id] = topic
             elif isinstance(record, Message) and record.channel_id in channels:
@@ -88,18 +91,15 @@ def _read(
                 yield Recorded(topic.name, message, record.log_time, record.publish_time, record.sequence)
 
 
-def _row(name: str, channel: Channel, schemas: dict[int, Schema]) -> topics.Topic | None:
+def _row(name: str, schema: Schema | None) -> topics.Topic | None:
     """The topic's row of the table, or one by its schema in the recording; None if that cannot be read."""
-    schema = schemas.get(channel.schema_id)
     if schema is None or name == topics.TRUTH_VIEW.name:  # the view is stored as another type
         with contextlib.suppress(KeyError, ValueError):
             return topics.by_name(name)
         return None
-    row = row_of(name, schema.name)
-    if row is None:
-        with contextlib.suppress(InputError):
-            row = unknown_row(name, type_of(schema))
-    return row
+    with contextlib.suppress(InputError):
+        return row_of(name, schema)
+    return None
 
 
 def _records(file: IO[bytes], size: int) -> Iterator[McapRecord]:

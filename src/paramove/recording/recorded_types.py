@@ -1,4 +1,4 @@
-"""Message types by the schemas that a recording has in it, for topics that no table here knows."""
+"""Message types by the schemas that a recording has in it: for topics that no table here knows, or knows otherwise."""
 
 from __future__ import annotations
 
@@ -12,22 +12,37 @@ from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 from google.protobuf.message_factory import GetMessageClass  # type: ignore[import-untyped]
 from mcap.records import Schema
 
-from paramove.bus import Topic, topics
+from paramove.bus import Topic, changed_field, is_own, topics
 from paramove.documents import InputError
 
 
-def row_of(name: str, type_name: str) -> Topic | None:
-    """The topic's row of the table, if messages of this type are on it there."""
+def row_of(name: str, schema: Schema) -> Topic:
+    """The topic's row of the table if messages of the schema can be read by its type, else one of the recording's own.
+
+    What the library has changed in its own types can be read; a workspace's type may have changed in any way.
+
+    Raises InputError for a topic that no table here knows and whose schema cannot be used.
+    """
     with contextlib.suppress(KeyError, ValueError):
         row = topics.by_name(name)
-        if row.type_name == type_name:
+        if row.type_name == schema.name and not (is_own(row.type.DESCRIPTOR) and change_of(row, type_of(schema))):
             return row
-    return None
+    return recorded_row(name, type_of(schema))
 
 
-def unknown_row(name: str, kind: type[Any]) -> Topic:
-    """A row for a topic that no table here knows."""
-    return Topic(name, kind, None, topics.Profile.QUEUE)
+def recorded_row(name: str, kind: type[Any]) -> Topic:
+    """A row for a topic that no table here knows, or knows with another type."""
+    return Topic(name, kind, None, topics.Profile.QUEUE, max_bytes=topics.IMAGE_BYTES)
+
+
+def change_of(row: Topic, recorded: type[Any]) -> str:
+    """What is another now in the type of a topic, so that messages of a recorded class cannot be read by it; "" if they
+    can."""
+    if row.type is recorded:
+        return ""
+    if row.type_name != recorded.DESCRIPTOR.full_name:
+        return f"{recorded.DESCRIPTOR.full_name} is {row.type_name} now"
+    return changed_field(row.type.DESCRIPTOR, recorded.DESCRIPTOR)
 
 
 def type_of(schema: Schema) -> type[Any]:

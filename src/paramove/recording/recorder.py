@@ -8,7 +8,6 @@ messages are dropped and counted.
 
 from __future__ import annotations
 
-import errno
 import logging
 import shutil
 import threading
@@ -20,6 +19,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from paramove.bus import Bus, Received
+from paramove.documents import FULL_DISK
 from paramove.recording.parts import next_part
 from paramove.recording.writer import RecordingWriter
 
@@ -30,9 +30,10 @@ SYNC_S = 1.0
 WAITING_BYTES = 64 * 2**20
 LOW_BYTES = 10**9
 """Free on the disk; with less the node is degraded."""
+REQUEST_AGE_NS = 10**9
+"""A request that seems to be older than that, or of the future, has the time of another clock."""
 ROOM_BYTES = 16 * 2**20
 """Free on a disk that was full before it is written to again."""
-FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 
 
 class Recorder:
@@ -68,7 +69,7 @@ class Recorder:
         try:
             self._begin_part()
         except OSError as error:
-            if error.errno not in FULL:
+            if error.errno not in FULL_DISK:
                 raise
             self._handle_fault(error)
         self._threads = ThreadPoolExecutor(2, "recorder")
@@ -78,12 +79,18 @@ class Recorder:
     def keep(self, received: Received, message: Any = None) -> None:
         """Records a message. Never waits for a disk, but in lockstep.
 
+        A request to arm or stop counts whatever clock its sender has; with another than that of the run it is recorded
+        at the time of its arrival.
+
         Args:
             received: The message.
             message: Written instead, if given.
         """
         to_write = received.message if message is None else message
         size = to_write.ByteSize()
+        captured_ns, published_ns = received.captured_ns, received.published_ns
+        if received.topic.is_request and self._is_of_another_clock(received):
+            captured_ns = published_ns = self._bus.now_ns
         with self._changed:
             if self._bus.settings.lockstep:
                 self._changed.wait_for(
@@ -93,9 +100,7 @@ class Recorder:
                 )
             if self._running.done():
                 self._running.result()  # raises the exception that ended the thread
-            self._waiting.append(
-                (size, (received.topic.name, to_write, received.captured_ns, received.published_ns, received.sequence))
-            )
+            self._waiting.append((size, (received.topic.name, to_write, captured_ns, published_ns, received.sequence)))
             self._bytes += size
             while self._bytes > WAITING_BYTES and len(self._waiting) > 1:
                 self._bytes -= self._waiting.popleft()[0]
@@ -130,6 +135,10 @@ class Recorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _is_of_another_clock(self, received: Received) -> bool:
+        age_ns = self._bus.now_ns - received.published_ns
+        return age_ns < -REQUEST_AGE_NS or (age_ns > REQUEST_AGE_NS and not received.resent)
 
     def _run(self) -> None:
         try:
@@ -212,7 +221,7 @@ class Recorder:
         try:
             part.close()
         except OSError as error:
-            if error.errno in FULL:
+            if error.errno in FULL_DISK:
                 raise
             part.abandon()
             with self._changed:

@@ -35,17 +35,20 @@ class JointPart(_Part):
 
 
 class MotorPart(_Part):
-    """Abilities and limits of a kind of motor. `position_gains`: P, I and D of a servo's own loop, in its units."""
+    """Abilities and limits of a kind of motor. `position_gains`: P, I and D of a servo's own loop, in its units.
+
+    A planned motion that is slower than the least operating limits has more points than a driver takes.
+    """
 
     loop: Literal["velocity", "servo"]
     torque_average: float = Field(gt=0)
     torque_peak: float = Field(gt=0)
     velocity_deg_s: float = Field(gt=0)
     margin_deg: float = Field(ge=0)
-    operating_velocity_deg_s: float = Field(gt=0)
-    operating_acceleration_deg_s2: float = Field(gt=0)
+    operating_velocity_deg_s: float = Field(ge=1.0)
+    operating_acceleration_deg_s2: float = Field(ge=1.0)
     stop_acceleration_deg_s2: float = Field(gt=0)
-    jerk_deg_s3: float = Field(gt=0)
+    jerk_deg_s3: float = Field(ge=1.0)
     position_gains: tuple[int, int, int] | None = None
 
 
