@@ -63,6 +63,39 @@ def test_theta_in_another_unit_is_named_with_where_the_hand_goes(movements):
     assert "millimetres?" in oddity.message
 
 
+@pytest.mark.parametrize("factor", [0.2, 5.0])
+def test_a_movement_of_another_duration_is_named(movements, factor):
+    odd = changed(movements, 4, time=movements[4].time * factor)
+    (oddity,) = named(oddities(odd), movements, 4)
+    assert "is its rate right?" in oddity.message
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_person_may_take_twice_as_long(movements, factor):
+    assert oddities(changed(movements, 4, time=movements[4].time * factor)) == []
+
+
+def test_a_number_in_theta_far_from_all_others_is_named(movements):
+    theta = movements[7].theta.copy()
+    theta[1] = 3.5
+    (oddity,) = [one for one in oddities(changed(movements, 7, theta=theta)) if "typed correctly?" in one.message]
+    assert movements[7].source in oddity.message
+    assert "its target_y is 3.5" in oddity.message
+
+
+@pytest.mark.parametrize(
+    ("order", "signs", "words"),
+    [
+        ((1, 0, 2), (1, 1, 1), "the hand goes along y where target_x changes"),
+        ((0, 1, 2), (1, -1, 1), "target_y grows where the hand's y falls"),
+        ((0, 1, 2), (-1, 1, 1), "target_x grows where the hand's x falls"),
+    ],
+)
+def test_theta_in_other_axes_than_the_points_is_named(movements, order, signs, words):
+    turned = [replace(one, theta=one.theta[list(order)] * np.array(signs)) for one in movements]
+    assert any(words in oddity.message for oddity in oddities(turned))
+
+
 def test_swapped_points_are_named(movements):
     positions = movements[9].positions.copy()
     positions[:, [2, 3]] = positions[:, [3, 2]]

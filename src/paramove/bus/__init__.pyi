@@ -18,11 +18,10 @@ from .envelope import RejectedError as RejectedError
 from .envelope import pack as pack
 from .envelope import unpack as unpack
 from .exchange import Exchange as Exchange
-from .fields import is_map as is_map
 from .fields import changed_field as changed_field
+from .fields import is_map as is_map
 from .fields import is_own as is_own
 from .fields import times_in as times_in
-from .fields import value_of as value_of
 from .fields import value_of as value_of
 from .fields import written_out as written_out
 from .inspection import BusVisitor as BusVisitor

@@ -6,8 +6,8 @@ grows by new fields, which protobuf preserves or ignores, so programs of differe
 would break that (a field that changes its number, type or label) is caught by a test against the schemas of every
 release in `tests/data/releases`; an incompatible change raises the type's generation here.
 
-Nobody tests the types of a workspace so, and they are changed while they are developed. Their number covers their fields
-too: after a change all programs of a run have to be started again.
+Nobody tests the types of a workspace so, and they are changed while they are developed. Their number covers their
+fields, too: after a change all programs of a run have to be started again.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Counts for the type that stands in the topic table, also if the change was in a 
 
 
 def schema_hash(message_type: type[Any]) -> int:
-    """First 64 bits (little-endian) of SHA-256 over "<full name> <generation>"; of a workspace's type its fields, too."""
+    """First 64 bits (little-endian) of SHA-256 over "<full name> <generation>", in a workspace also over its fields."""
     return _hash_of_type(message_type.DESCRIPTOR)
 
 

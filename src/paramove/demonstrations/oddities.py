@@ -36,8 +36,17 @@ THETA_UNIT = 20.0
 """Numbers in theta so many times as large as those of the points are in another unit."""
 LARGEST_M, SMALLEST_M = 10.0, 0.005
 """Extents of the path of a hand."""
-ANGLE = re.compile(r"(?:.*[_ ])?(?:angle|yaw|roll|pitch|azimuth|heading|direction|bearing|turn|rotation|phi|deg|rad)s?"
-                   r"(?:[_ ].*)?", re.IGNORECASE)  # fmt: skip
+ANGLE = re.compile(
+    r"(?:.*[_ ])?(?:angle|yaw|roll|pitch|azimuth|heading|direction|dir|bearing|orientation|turn|rotation|rot|r[xyz]|"
+    r"theta|alpha|beta|gamma|phi|psi|deg|rad)s?(?:[_ ].*)?",
+    re.IGNORECASE,
+)
+OTHER_DURATION = 3.0
+"""A movement that lasts so many times as long as the others, or that part of it, has another rate."""
+FAR_RANGES = 3.0
+"""A number in theta so many ranges of the others' away from them is a typing error."""
+FOLLOWS, IGNORES = 0.9, 0.4
+"""Correlations of a number in theta with the coordinate that it is, and with one that it is not."""
 NUMBERED = re.compile(r"parameter_\d+")
 
 
@@ -55,7 +64,13 @@ class Oddity(NamedTuple):
 
 def oddities(movements: Sequence[Movement]) -> list[Oddity]:
     """What hardly fits in movements that have the same points and parameters."""
-    found = [*_sizes(movements), *_unit_of_theta(movements), *_angles(movements)]
+    about_unit = list(_unit_of_theta(movements))
+    found = [*_sizes(movements), *about_unit, *_angles(movements)]
+    for action in sorted({movement.action for movement in movements}):
+        of_action = [movement for movement in movements if movement.action == action]
+        found += _durations(of_action)
+        if not about_unit:
+            found += [*_far_in_theta(of_action), *_axes_of_theta(of_action)]
     if not any(oddity.spoils for oddity in found):
         found += _labels(movements)
     return found
@@ -186,6 +201,60 @@ def _unit_of_theta(movements: Sequence[Movement]) -> Iterator[Oddity]:
                 f"{_unit(float(largest[number] / max(float(np.median(others)), 1e-12)))}? Theta is in metres",
                 spoils=True,
             )
+
+
+def _durations(movements: Sequence[Movement]) -> Iterator[Oddity]:
+    """Movements of one action that last far longer, or shorter, than the others."""
+    durations = np.array([movement.duration for movement in movements])
+    for number, movement in enumerate(movements if len(movements) > 2 else ()):
+        usual = float(np.median(np.delete(durations, number)))
+        if not usual / OTHER_DURATION < durations[number] < usual * OTHER_DURATION:
+            yield Oddity(
+                f"{movement.source}: it lasts {durations[number]:.3g} s, the others {usual:.3g} s: is its rate right?"
+            )
+
+
+def _far_in_theta(movements: Sequence[Movement]) -> Iterator[Oddity]:
+    """Numbers in theta of one action that are far from those of all others."""
+    theta = np.array([movement.theta for movement in movements]).reshape(len(movements), -1)
+    for number, movement in enumerate(movements if len(movements) > FEWEST - 2 else ()):
+        others = np.delete(theta, number, axis=0)
+        low, high = others.min(axis=0), others.max(axis=0)
+        away = np.maximum(theta[number] - high, low - theta[number])
+        for column in np.flatnonzero((away > FAR_RANGES * (high - low)) & (high > low)).tolist():
+            yield Oddity(
+                f"{movement.source}: its {movement.parameter_names[column]} is {theta[number, column]:.4g}, that of "
+                f"the others {low[column]:.4g} ... {high[column]:.4g}: is it typed correctly?"
+            )
+
+
+def _axes_of_theta(movements: Sequence[Movement]) -> Iterator[Oddity]:
+    """Positions in theta of one action that the hand follows along another axis, or backwards."""
+    names = movements[0].parameter_names
+    place = position_in_theta(names)
+    if place is None or len(movements) < FEWEST:
+        return
+    theta = np.array([movement.theta[place] for movement in movements])
+    hand = _hand(movements)
+    goals = np.stack([_farthest(movement.positions[:, hand]) for movement in movements])
+    for axis, name in enumerate(names[place]):
+        if len(np.unique(theta[:, axis])) < 3:
+            continue
+        follows = np.array([_correlation(theta[:, axis], goals[:, other]) for other in range(goals.shape[1])])
+        other = int(np.argmax(np.abs(follows)))
+        if follows[axis] < -FOLLOWS:
+            yield Oddity(f"{name} grows where the hand's {'xyz'[axis]} falls: is theta in the axes of the points?")
+        elif abs(follows[other]) > FOLLOWS and abs(follows[axis]) < IGNORES:
+            yield Oddity(
+                f"the hand goes along {'xyz'[other]} where {name} changes, not along {'xyz'[axis]}: is theta in the "
+                "axes of the points?"
+            )
+
+
+def _correlation(one: Floats, other: Floats) -> float:
+    """Pearson's; 0 for values that are all equal."""
+    spread = float(one.std() * other.std())
+    return float(((one - one.mean()) * (other - other.mean())).mean()) / spread if spread > 0.0 else 0.0
 
 
 def _angles(movements: Sequence[Movement]) -> Iterator[Oddity]:

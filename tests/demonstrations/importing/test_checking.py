@@ -134,6 +134,24 @@ def test_row_numbers_of_a_table_count_frames_only_if_they_can(tmp_path):
         import_file(file, ImportOptions(unit="m", rate_hz=RATE_HZ), REACH)
 
 
+@pytest.mark.parametrize(
+    "name", ["Frame", "fnum", "frame_idx", "Frame No.", "frameNumber", "Frame #", "FrameID", "row"]
+)
+def test_frame_numbers_have_many_names(tmp_path, name):
+    file = write(tmp_path, {name: np.arange(61.0)} | points(index=path()), rows=[*range(20), *range(40, 61)])
+    assert len(import_file(file, ImportOptions(unit="m", rate_hz=RATE_HZ), REACH).takes[0].time) == 61
+
+
+def test_a_rate_that_hides_a_hole_in_the_times_or_contradicts_them_is_said(tmp_path):
+    columns = {"time": TIME} | points(index=path())
+    holes = write(tmp_path, columns, rows=[*range(20), *range(40, 61)])
+    assert said(import_file(holes, ImportOptions(unit="m", rate_hz=RATE_HZ), REACH), "20 frames are missing", "row 20")
+    whole = write(tmp_path, columns, name="whole.csv")
+    found = import_file(whole, ImportOptions(unit="m", rate_hz=120.0), REACH)
+    assert said(found, "its times mean 60 frames a second; the given 120 are used")
+    assert not said(import_file(whole, ImportOptions(unit="m", rate_hz=RATE_HZ), REACH), "its times mean")
+
+
 def test_frame_numbers_may_count_in_larger_steps(tmp_path):
     file = write(tmp_path, {"frame": 2 * np.arange(61.0)} | points(index=path()))
     found = import_file(file, ImportOptions(unit="m", rate_hz=RATE_HZ), REACH)
@@ -210,6 +228,48 @@ def test_rest_a_second_take_and_one_outlier_are_places():
         assert not placeholders(places).any()
 
 
+@pytest.mark.parametrize("value", [0.0, -1.0, 9999.0])
+def test_one_axis_that_stands_for_none_is_a_loss(tmp_path, value):
+    lost = path()
+    lost[20:40, 2] = value
+    found = import_file(write(tmp_path, {"time": TIME} | points(index=lost)), ImportOptions(unit="m"), REACH)
+    assert said(found, "z of index is at one position far from all others in frames 20-39")
+    assert np.isnan(found.takes[0].positions[20:40]).all()
+    assert np.isfinite(found.takes[0].positions[:20]).all()
+
+
+def test_a_step_that_no_hand_makes_is_named(tmp_path):
+    leap = path()
+    leap[30] = -1.0
+    found = import_file(write(tmp_path, {"time": TIME} | points(index=leap)), ImportOptions(unit="m"), REACH)
+    assert said(found, "index moves", "from frame 30 to frame 31", "2 such steps")
+    assert not said(import_file(write(tmp_path, {"time": TIME} | points(index=path())), ImportOptions(unit="m"), REACH),
+                    "moves")  # fmt: skip
+
+
+def test_coordinates_from_the_first_position_on_are_places(tmp_path):
+    start = path() - path()[0]
+    found = import_file(write(tmp_path, {"time": TIME} | points(index=start)), ImportOptions(unit="m"), REACH)
+    assert_allclose(found.takes[0].positions[:, 0], start, atol=1e-12)
+    through = path() - path()[30]
+    found = import_file(write(tmp_path, {"time": TIME} | points(index=through)), ImportOptions(unit="m"), REACH)
+    assert np.isfinite(found.takes[0].positions).all()
+
+
+@pytest.mark.parametrize("names", [("index",), ("index", "wrist")])
+def test_a_capture_that_stands_still_is_named(tmp_path, names):
+    still = path()
+    still[21:40] = still[20]
+    file = write(tmp_path, {"time": TIME} | points(**dict.fromkeys(names, still)))
+    assert said(import_file(file, ImportOptions(unit="m"), REACH), "all points repeat", "frames 21-39")
+
+
+def test_people_who_rest_before_they_move_are_no_capture_that_stands_still(tmp_path):
+    rest = np.concatenate([np.repeat(path()[:1], 10, axis=0), np.round(path(), 3)[:-10]])
+    file = write(tmp_path, {"time": TIME} | points(index=rest))
+    assert not said(import_file(file, ImportOptions(unit="m"), REACH), "all points repeat")
+
+
 def test_frozen_points_are_named_and_may_be_places(tmp_path):
     index = path()
     index[26:45] = index[25]
@@ -263,6 +323,15 @@ def test_points_of_two_persons_are_not_mixed(tmp_path, subject):
     options = ImportOptions(unit="m", points={"index": ("index",), "wrist": ("wrist",)}, subject=subject)
     with pytest.raises(DemonstrationError, match=r"Ben:wrist"):
         import_file(file, options)
+
+
+def test_the_subjects_points_come_before_those_without_a_person(tmp_path):
+    columns = {"time": TIME} | points(**{"Ann:index": path(), "Ben:index": path((1, 0, 0)), "index": path((2, 0, 0))})
+    file = write(tmp_path, columns)
+    for chosen in ({"index": ("index",)}, None):
+        (take,) = import_file(file, ImportOptions(unit="m", subject="Ann", points=chosen), REACH).takes
+        assert take.positions.shape[1] == 1
+        assert_allclose(take.positions[:, 0], path())
 
 
 def test_only_requested_points_decide(tmp_path):

@@ -42,6 +42,12 @@ def test_other_forms(tmp_path, text):
     assert_allclose(raw.positions[:, 0], [[1, 2, 3], [4, 5, 6]], rtol=0.0, atol=0.0)
 
 
+def test_columns_of_a_quaternion_are_no_point(tmp_path):
+    (raw,) = read_csv(write(tmp_path, "A_x,A_y,A_z,A_qx,A_qy,A_qz,A_qw\n1,2,3,0,0,0,1\n"))
+    assert raw.point_names == ("A",)
+    assert "'A_qx', 'A_qy', 'A_qz', 'A_qw'" in raw.remarks[0]
+
+
 def test_float64_is_kept_bit_by_bit(tmp_path):
     values = np.random.default_rng(0).normal(size=(20, 3))
     lines = [",".join(map(repr, row)) for row in values.tolist()]

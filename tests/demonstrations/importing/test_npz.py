@@ -54,7 +54,7 @@ def test_many_labelled_movements(tmp_path):
     raw = MANY["flat"][20, :3].astype(np.float64)
     assert_allclose(second.positions[0, 0], np.array([raw[2], -raw[0], raw[1]]) / 1000, rtol=1e-12, atol=0.0)
     assert found.parameter_names == ("target_x", "target_y", "target_z")
-    assert found.remarks == (f"{tmp_path / 'data.npz'}: left out 1 movements that have no target",)
+    assert f"{tmp_path / 'data.npz'}: left out 1 movements that have no target" in found.remarks
 
 
 def test_what_the_file_marks_as_unusable_is_left_out_and_told(tmp_path):
@@ -69,6 +69,7 @@ def test_what_the_file_marks_as_unusable_is_left_out_and_told(tmp_path):
     ("changes", "detail"),
     [
         ({"points": ["wrist"]}, "positions have shape"),
+        ({"positions": np.zeros((10, 3, 2))}, r"\(10, 3, 2\); 2 points need \(T, 2, 3\); transpose"),
         ({"rate_hz": None, "time": np.arange(9)}, "10 frames have times of shape"),
         ({"points": None}, "the array 'points' is missing; there are positions, rate_hz, unit"),
         ({"positions": np.array([None, None])}, "found pickled objects"),

@@ -6,7 +6,7 @@ true: the unit of its times, frames that are missing, and points that were lost.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -40,12 +40,19 @@ FROZEN_FRAMES = 3
 """So many equal positions, to the last bit, of a point that moves."""
 FAR = 10.0
 """How much longer steps to a position that stands for none are than the longest of the point's other steps."""
+ALL_AXES = slice(0, 3)
+COORDINATES = {"": ALL_AXES, **{f"{axis} of ": slice(number, number + 1) for number, axis in enumerate("xyz")}}
+"""What may stand for none, before the name of its point: the position, or one coordinate."""
 MOST_PLACEHOLDERS = 4
 """Different ones of a point."""
 QUANTA = 2.5
 """Steps of so many of the smallest steps in the data are movement, not rounding."""
 JUMP = 1.5
 """A point that was at rest starts with smaller steps; one that was frozen jumps to where it has got meanwhile."""
+FASTEST_M_S = 20.0
+"""No hand moves faster in a gesture, a reach or a throw."""
+OTHER_RATE = 0.05
+"""A rate that differs from that of the times by a larger fraction contradicts them."""
 STOP = 0.5
 """A point that comes to rest gets slower; one that freezes had at least this fraction of the speed before."""
 
@@ -120,18 +127,26 @@ def checked(
     time, about_time = _seconds(raw, rate_hz, file)
     remarks += about_time
     positions = raw.positions.copy()
-    if zeros_are_lost:
-        positions[(positions == 0.0).all(axis=-1)] = np.nan
     positions[~np.isfinite(positions).all(axis=-1)] = np.nan
+    if zeros_are_lost:
+        for point in range(positions.shape[1]):
+            positions[zeros(positions[:, point]), point] = np.nan
     if repeats_are_lost:
         for point, name in enumerate(raw.point_names):
-            marked = placeholders(positions[:, point])
-            positions[marked, point] = np.nan
-            if marked.any():
-                remarks.append(
-                    f"{file}: {name} is at one position far from all others in frames {frame_ranges(marked)}: lost "
-                    "there (--repeats-are-places: it was there)"
-                )
+            for what, axes in COORDINATES.items():
+                marked = placeholders(positions[:, point], axes)
+                positions[marked, point] = np.nan
+                if marked.any():
+                    remarks.append(
+                        f"{file}: {what}{name} is at one position far from all others in frames "
+                        f"{frame_ranges(marked)}: lost there (--repeats-are-places: it was there)"
+                    )
+        stalled = stalls(positions)
+        if stalled.any():
+            remarks.append(
+                f"{file}: all points repeat their positions exactly in frames {frame_ranges(stalled)}, and jump "
+                "afterwards: did the capture stand still?"
+            )
         repeated = frozen(positions)
         positions[repeated] = np.nan
         remarks += [
@@ -173,12 +188,33 @@ def _seconds(raw: RawTake, rate_hz: float | None, file: Path | str) -> tuple[Flo
 def _at_rate(raw: RawTake, rate_hz: float, file: Path | str) -> tuple[Floats, list[str]]:
     """Times of frames at a rate that was given, by their numbers where the file has them."""
     numbers, remarks = _counted(raw, file)
+    if numbers is None:
+        remarks += _against_times(raw, rate_hz, file)
     time: Floats = (np.arange(len(raw.positions)) if numbers is None else numbers) / rate_hz
     if len(time) and not time[-1] < LONGEST_S:
         raise DemonstrationError(f"{file}: {len(time)} frames at {rate_hz:g} Hz end after {time[-1]:g} s; check --rate")
     if not is_plausible(rate_hz):
         remarks.append(f"{file}: {rate_hz:g} frames a second are unusual; expected {MIN_RATE_HZ:g} to {MAX_RATE_HZ:g}")
     return time, remarks
+
+
+def _against_times(raw: RawTake, rate_hz: float, file: Path | str) -> list[str]:
+    """What the file's times say against frames at a rate that was given."""
+    if raw.time is None or len(raw.time) < 3 or not (np.diff(raw.time) > 0.0).all():
+        return []
+    time = raw.time - raw.time[0]
+    missing = missing_frames(time)
+    if missing.any():
+        first = int(np.flatnonzero(missing)[0])
+        return [
+            f"{file}: by its times {missing.sum()} frames are missing, the first after row {first + 1}; at the given "
+            "rate its rows follow each other without a hole: leave the rate out to use the times"
+        ]
+    units = [raw.time_unit_s] if raw.time_unit_s else _fitting_units(time)
+    rates = [1.0 / (period_of(time) * unit_s) for unit_s in units]
+    if not rates or any(abs(one / rate_hz - 1.0) <= OTHER_RATE for one in rates):
+        return []
+    return [f"{file}: its times mean {rates[0]:.4g} frames a second; the given {rate_hz:g} are used"]
 
 
 def _check_increasing(as_read: Floats, time: Floats, unit_s: float, file: Path | str) -> None:
@@ -321,11 +357,32 @@ def _with_missing_frames(take: RawTake, file: Path | str) -> tuple[RawTake, list
 # Loss -------------------------------------------------------------------------------------------------------------
 
 
-def placeholders(path: Floats) -> NDArray[np.bool_]:
+def zeros(path: Floats) -> NDArray[np.bool_]:
+    """Where a point was lost that is exactly at (0, 0, 0). Shapes (T, 3) -> (T,).
+
+    Coordinates may begin at the first position, or pass the origin: there it is for one frame, and the steps to it are
+    as all others.
+    """
+    at_zero: NDArray[np.bool_] = (path == 0.0).all(axis=1)
+    elsewhere = np.isfinite(path).all(axis=1) & ~at_zero
+    steps = np.abs(np.diff(path, axis=0)).max(axis=1, initial=0.0)
+    crossing = (at_zero[1:] & elsewhere[:-1]) | (elsewhere[1:] & at_zero[:-1])
+    others = steps[elsewhere[1:] & elsewhere[:-1]]
+    lasts = (at_zero[1:] & at_zero[:-1]).any()
+    if crossing.any() and not lasts and others.size and steps[crossing].max() <= JUMP * np.percentile(others, 90):
+        return np.zeros_like(at_zero)
+    return at_zero
+
+
+def placeholders(path: Floats, axes: slice = ALL_AXES) -> NDArray[np.bool_]:
     """Where a point has a position that stands for none, such as (-1, -1, -1). Shapes (T, 3) -> (T,).
 
     That is one position, to the last bit, in several frames, into and out of which every step is `FAR` times as long as
     the longest of all other steps from frame to frame. A point that rests is reached and left smoothly.
+
+    Args:
+        path: Of the point; NaN where it is lost already.
+        axes: Whose coordinates stand for none: all, or one, such as the depth of a camera.
     """
     marked: NDArray[np.bool_] = np.zeros(len(path), dtype=np.bool_)
     if len(path) < 2:
@@ -335,11 +392,11 @@ def placeholders(path: Floats) -> NDArray[np.bool_]:
     for _ in range(MOST_PLACEHOLDERS):
         places = known & ~marked
         longest = int(np.argmax(np.where(places[1:] & places[:-1], steps, 0.0)))
-        ends = [(path == path[frame]).all(axis=1) for frame in (longest, longest + 1)]
+        ends = [places & (path[:, axes] == path[frame, axes]).all(axis=1) for frame in (longest, longest + 1)]
         far = [inside for inside in ends if inside.sum() > 1 and _is_far(inside, places & ~inside, steps)]
         if not far:
             break
-        marked |= far[0]
+        marked |= min(far, key=np.count_nonzero)
     return marked
 
 
@@ -348,6 +405,21 @@ def _is_far(inside: NDArray[np.bool_], others: NDArray[np.bool_], steps: Floats)
     crossing = (inside[1:] & others[:-1]) | (others[1:] & inside[:-1])
     usual = float(steps[others[1:] & others[:-1]].max(initial=0.0))
     return bool(crossing.any() and usual > 0.0 and steps[crossing].min() > FAR * usual)
+
+
+def stalls(positions: Floats) -> NDArray[np.bool_]:
+    """Frames in which all points only repeat their positions, and after which one jumps. Shapes (T, P, 3) -> (T,)."""
+    stalled: NDArray[np.bool_] = np.zeros(len(positions), dtype=np.bool_)
+    same = np.zeros_like(stalled)
+    same[1:] = (positions[1:] == positions[:-1]).all(axis=(1, 2))  # NaN equals nothing
+    for first, end in runs(same):
+        if end - first < FROZEN_FRAMES - 1 or end >= len(positions):
+            continue
+        for path in positions.swapaxes(0, 1):
+            valid = np.flatnonzero(np.isfinite(path[:, 0]))
+            if _is_frozen(path, valid, first, end, QUANTA * _smallest_step(path)):
+                stalled[first:end] = True
+    return stalled
 
 
 def frozen(positions: Floats) -> NDArray[np.bool_]:
@@ -413,6 +485,24 @@ def _others_move(positions: Floats, point: int, first: int, end: int, noise: Flo
     moved[~np.isfinite(moved)] = 0.0
     moved[:, point] = 0.0
     return bool((moved.max(axis=0) > noise).any())
+
+
+def about_leaps(time: Floats, positions: Floats, names: Sequence[str], file: Path | str) -> list[str]:
+    """Remarks on points (T, P, 3), m, that move faster than any hand from one frame to the next."""
+    if len(time) < 2:
+        return []
+    remarks = []
+    lengths = np.linalg.norm(np.diff(positions, axis=0), axis=2)
+    speeds = np.nan_to_num(lengths / np.diff(time)[:, None])
+    for name, of_point, speed in zip(names, lengths.T, speeds.T, strict=True):
+        fast = np.flatnonzero(speed > FASTEST_M_S)
+        if fast.size:
+            worst = int(fast[np.argmax(speed[fast])])
+            remarks.append(
+                f"{file}: {name} moves {of_point[worst]:.3g} m from frame {worst} to frame {worst + 1} "
+                f"({speed[worst]:.3g} m/s; {len(fast)} such steps): was it lost there, or is the unit or rate wrong?"
+            )
+    return remarks
 
 
 def extent(positions: Floats) -> str:

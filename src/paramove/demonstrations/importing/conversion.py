@@ -12,13 +12,13 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from paramove.demonstrations import DemonstrationError, Take, position_in_theta, recording_name
-from paramove.demonstrations.importing.checking import RawTake, checked, extent
+from paramove.demonstrations.importing.checking import RawTake, about_leaps, checked, extent
 from paramove.documents import Floats, closest, nearest, read_document
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 FRAME = "laboratory"
-UNLABELLED = ("", "*")
-"""Names of C3D files for markers that nobody has named."""
+UNLABELLED = "*"
+"""Begin of the names that C3D files have for markers that nobody has named, such as `*110`."""
 
 DIRECTIONS = {
     "forward": (1.0, 0.0, 0.0),
@@ -102,6 +102,7 @@ def converted(raw: RawTake, options: ImportOptions, file: Path | str) -> tuple[T
     if options.axes is None and not raw.axes_are_known:
         remarks += (_assumed(raw.axes or "z_up", positions, file),)
     time: Floats = np.asarray(take.time)
+    remarks += tuple(about_leaps(time, positions, names, file))
     return Take(recording_name(raw.name), time, positions, names, FRAME, labels), remarks
 
 
@@ -134,8 +135,9 @@ def chosen_points(
     are, and for points that cannot be used. Points that are not requested do not matter.
     """
     if requested is None:
-        named = [number for number, name in enumerate(take.point_names) if name not in UNLABELLED]
-        requested = {take.point_names[number]: (take.point_names[number],) for number in named}
+        named = [name for name in take.point_names if name and not name.startswith(UNLABELLED)]
+        of_subject = [name for name in named if subject and _person(name) == subject.casefold()]
+        requested = {name: (name,) for name in of_subject or named}
     numbers: dict[str, int] = {}
     for point, names in requested.items():
         for source in names:
@@ -158,14 +160,16 @@ def chosen_points(
 
 def _number(source: str, point: str, names: Sequence[str], subject: str, file: Path | str) -> int:
     """Number of the one point of a file that is meant by a name for a body point."""
-    candidates = [number for number, name in enumerate(names) if name == source]
+    whole = [number for number, name in enumerate(names) if name == source]
+    short = [number for number, name in enumerate(names) if name.rpartition(":")[2] == source]
+    of_subject = [number for number in short if subject and _person(names[number]) == subject.casefold()]
+    if ":" not in source and subject and subject.casefold() in map(_person, names):
+        candidates = of_subject
+    else:
+        candidates = whole or short
     if not candidates:
-        candidates = [number for number, name in enumerate(names) if name.rpartition(":")[2] == source]
-        if subject and subject.casefold() in map(_person, names):
-            candidates = [number for number in candidates if _person(names[number]) == subject.casefold()]
-    if not candidates:
-        short = [name.rpartition(":")[2] for name in names]
-        hint = "".join(f"; did you mean '{one}'?" for one in closest(source, short))
+        ends = [name.rpartition(":")[2] for name in names]
+        hint = "".join(f"; did you mean '{one}'?" for one in closest(source, ends))
         raise DemonstrationError(f"{file} has no point '{source}' for {point}{hint} It has {', '.join(names)}")
     if len(candidates) > 1:
         there = ", ".join(f"{names[number]} (point {number + 1})" for number in candidates)

@@ -26,8 +26,10 @@ UNITS = {
     "us": "microseconds", "µs": "microseconds", "μs": "microseconds", "usec": "microseconds",
     "microseconds": "microseconds", "ns": "nanoseconds", "nsec": "nanoseconds", "nanoseconds": "nanoseconds",
 }  # fmt: skip
-FRAME_NUMBERS = {"frame", "frames", "frame#", "frame_number", "frame number", "frame_id", "field", "sample", "samples"}
-ROW_NUMBERS = {"", "index", "unnamed: 0"}
+FRAME_NUMBERS = re.compile(
+    r"(?:frames?|fnum|samples?|field)[ _.-]*(?:#|no|nr|num|numbers?|idx|index|id)?[.]?", re.IGNORECASE
+)
+ROW_NUMBERS = {"", "index", "unnamed: 0", "row", "rows"}
 """Names of the column of row numbers that tables of pandas have; they count frames if they are whole and increase."""
 LINE_LETTERS = 2**20
 """Maximum length of a line; a longer one is cut, and rejected for its number of cells."""
@@ -170,9 +172,10 @@ def _columns(path: Path, header: list[str]) -> _Columns:
     """Meaning of the columns; raises DemonstrationError if there is no point at all."""
     times = [(number, match) for number, name in enumerate(header) if (match := _time_column(name))]
     time, unit = times[0] if times else (None, None)
-    frames = next((number for number, name in enumerate(header) if name.casefold() in FRAME_NUMBERS), None)
+    frames = next((number for number, name in enumerate(header) if FRAME_NUMBERS.fullmatch(name)), None)
     if frames is None:
         frames = next((number for number, name in enumerate(header) if name.casefold() in ROW_NUMBERS), None)
+    known = {name.casefold() for name in header}
     found: dict[str, dict[str, list[int]]] = {}
     separated: set[str] = set()
     others = []
@@ -180,7 +183,7 @@ def _columns(path: Path, header: list[str]) -> _Columns:
         if number in (time, frames):
             continue
         parts = COLUMN.fullmatch(name)
-        if parts is None:
+        if parts is None or _is_of_quaternion(parts[1], known):
             others.append(name)
             continue
         found.setdefault(parts[1], {}).setdefault(parts[3].lower(), []).append(number)
@@ -203,6 +206,11 @@ def _columns(path: Path, header: list[str]) -> _Columns:
         )
     unit_s = TIME_UNITS[UNITS[unit]] if unit in UNITS else None
     return _Columns(time, unit_s, frames, points, faults, others)
+
+
+def _is_of_quaternion(point: str, header: set[str]) -> bool:
+    """Whether the columns x, y and z of a name are those of a quaternion, which has a w, too."""
+    return any(f"{point}{separator}w".casefold() in header for separator in ("", "_", ".", " ", "-"))
 
 
 def _time_column(name: str) -> str | None:

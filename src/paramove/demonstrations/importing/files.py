@@ -120,7 +120,8 @@ def _without_long_gaps(take: Take, path: str, max_gap: float) -> tuple[Take, lis
         if open_gaps:
             always = [gap.point for gap in open_gaps if gap.end - gap.first == len(take.time)]
             hint = (
-                f" {', '.join(always)} is lost in all frames: is it (0, 0, 0) on purpose (--zeros-are-places)?"
+                f" {', '.join(always)} is lost in all frames: name those that are needed with --point; or is it "
+                "(0, 0, 0) on purpose (--zeros-are-places)?"
                 if always
                 else ""
             )

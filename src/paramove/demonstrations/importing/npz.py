@@ -42,9 +42,11 @@ def read_npz(path: Path) -> list[RawTake]:
 def _one(path: Path, arrays: Arrays) -> RawTake:
     names = tuple(str(name) for name in np.atleast_1d(arrays["points"]))
     positions = np.asarray(arrays["positions"], dtype=np.float64)
-    if positions.size != len(positions) * len(names) * 3 or positions.ndim not in (2, 3):
+    shape = (len(names), 3)
+    if positions.shape[1:] not in (shape, (3 * len(names),)):
         raise DemonstrationError(
             f"{path}: positions have shape {positions.shape}; {len(names)} points need (T, {len(names)}, 3)"
+            + ("; transpose(0, 2, 1) turns them" if positions.shape[1:] == shape[::-1] else "")
         )
     check_length(len(positions), path)
     rate = next((float(arrays[key]) for key in ("rate_hz", "fps") if key in arrays), None)
