@@ -74,6 +74,7 @@ def test_old_machine_code_is_not_used_and_not_stored_for_ever(folder):
     assert new != old
 
 
+@pytest.mark.long
 def test_a_file_that_was_cut_off_is_compiled_again(folder):
     ended(started(folder, "1"))
     (stored,) = folder.rglob("*.nbc")

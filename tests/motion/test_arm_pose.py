@@ -16,7 +16,7 @@ from paramove.motion.reaching_movement import ArmPoses
 from tests.motion.reaching import ARM, HOAP3, solver
 
 LOWER, UPPER = HOAP3.soft_lower[ARM.indices], HOAP3.soft_upper[ARM.indices]
-EASY = settings(deadline=None, max_examples=60, derandomize=True)
+EASY = settings(deadline=None, max_examples=25, derandomize=True)
 # The solver keeps this much inside the limits, as paths are curves through its poses.
 MARGIN = np.deg2rad(0.3)
 

@@ -116,7 +116,7 @@ def test_a_person_who_comes_back_is_found(room):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("movement", [waving, scratching])
+@pytest.mark.parametrize("movement", [waving, pytest.param(scratching, marks=pytest.mark.long)])
 def test_what_is_not_in_the_vocabulary_is_lost_until_the_arm_rests_again(room, movement):
     made = room[0]
     outcome = outcome_of(room, made.moving(movement(made.rest)))

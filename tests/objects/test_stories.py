@@ -85,7 +85,7 @@ def hoap3() -> RobotDescription:
         pytest.param(1, 35, 34, 8, marks=pytest.mark.long),
         pytest.param(3, 52, 28, 6, marks=pytest.mark.long),
         (6, 65, 25, 2),
-        (7, 65, 34, 8),
+        pytest.param(7, 65, 34, 8, marks=pytest.mark.long),
     ],
 )
 def test_rules_hold_whatever_camera_and_openings(

@@ -154,7 +154,7 @@ def test_an_error_while_recording_still_finishes_the_file(tmp_path: Path) -> Non
     assert len(found_in(path)) == 1
 
 
-@settings(deadline=None, max_examples=150, derandomize=True)
+@settings(deadline=None, max_examples=50, derandomize=True)
 @given(share=st.floats(0.0, 1.0))
 def test_a_file_cut_anywhere_gives_the_messages_before(tmp_path_factory: pytest.TempPathFactory, share: float) -> None:
     whole, written = finished()
@@ -177,7 +177,7 @@ def test_all_finished_chunks_before_the_cut_are_there(tmp_path: Path) -> None:
     assert lengths[-1] > 0.5 * len(written)
 
 
-@settings(deadline=None, max_examples=100, derandomize=True)
+@settings(deadline=None, max_examples=40, derandomize=True)
 @given(share=st.floats(0.0, 0.95), damage=st.binary(min_size=1, max_size=40))
 def test_a_damaged_file_never_crashes_the_reader(
     tmp_path_factory: pytest.TempPathFactory, share: float, damage: bytes

@@ -46,6 +46,7 @@ def test_arm_driver_killed_in_motion_comes_back_disarmed_and_the_run_ends_so(tmp
     assert result.exit_code == 1
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("runtime")
 def test_camera_killed_comes_back_and_the_run_goes_on(tmp_path: Path) -> None:
     result = killed("camera", "rest", tmp_path)
@@ -55,6 +56,7 @@ def test_camera_killed_comes_back_and_the_run_goes_on(tmp_path: Path) -> None:
     assert (outcome["state"], outcome["exit_code"], outcome["restarts"]) == ("stopped", 0, 1)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("runtime")
 def test_simulator_killed_ends_the_run_and_is_named(tmp_path: Path) -> None:
     result = killed("simulator", "moving", tmp_path)

@@ -22,8 +22,8 @@ def test_the_object_ends_where_the_person_points(launcher):
     assert (launcher.latest / "relocations.mp4").stat().st_size > 10_000
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("robot", ["koch_v1_1", pytest.param("open_manipulator_x", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("robot", ["koch_v1_1", "open_manipulator_x"])
 def test_a_servo_arm_puts_the_object_where_a_person_points(launcher, robot):
     """By images, joint states and emulated servos; in lockstep."""
     code, shown = launcher.run("relocate_by_pointing", "--robot", robot, "--headless", "--set", "relocator.places=1")

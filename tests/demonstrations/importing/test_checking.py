@@ -80,6 +80,7 @@ def test_a_late_time_does_not_make_the_interpolation_overshoot(tmp_path, late, b
     time[late] = time[late + 1] - by_s
     found = import_file(write(tmp_path, {"time": time} | points(index=path())), ImportOptions(unit="m"), REACH)
     assert said(found, "doubtful", str(late + 1))
+    assert not said(found, "moves")
     assert len(found.takes[0].time) == 61
     for rate_hz in (60.0, 100.0):
         (movement,) = loaded(tmp_path / str(rate_hz), found).resampled(rate_hz)

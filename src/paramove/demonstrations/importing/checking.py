@@ -493,7 +493,8 @@ def about_leaps(time: Floats, positions: Floats, names: Sequence[str], file: Pat
         return []
     remarks = []
     lengths = np.linalg.norm(np.diff(positions, axis=0), axis=2)
-    speeds = np.nan_to_num(lengths / np.diff(time)[:, None])
+    durations = np.maximum(np.diff(time), period_of(time))  # of frames in bursts the times are wrong, not the positions
+    speeds = np.nan_to_num(lengths / durations[:, None])
     for name, of_point, speed in zip(names, lengths.T, speeds.T, strict=True):
         fast = np.flatnonzero(speed > FASTEST_M_S)
         if fast.size:
