@@ -73,6 +73,7 @@ def kills(
 
 def faults(
     section: Annotated[str, typer.Option(metavar="P,G", help="only these sections; default: all")] = "",
+    jobs: Annotated[int, typer.Option(min=1, help="tests at the same time")] = 1,
     json_file: JsonFileOption = None,
 ) -> None:
     """Run the test of every row of docs/faults.md and print the table with the results.
@@ -99,7 +100,7 @@ def faults(
         task = progress.add_task("tests", total=None)
         try:
             results = run_tests(
-                rows, workspace, lambda done, total: progress.update(task, completed=done, total=total or None)
+                rows, workspace, lambda done, total: progress.update(task, completed=done, total=total or None), jobs
             )
         except TestsNotRunError as error:
             Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)

@@ -51,13 +51,16 @@ class RowResult:
         return facts | {"tests": list(self.row.tests), "outcome": self.outcome, "message": self.message} | counts
 
 
-def run_tests(rows: Sequence[FaultRow], workspace: Path, progress: Callable[[int, int], None]) -> list[RowResult]:
+def run_tests(
+    rows: Sequence[FaultRow], workspace: Path, progress: Callable[[int, int], None], jobs: int = 1
+) -> list[RowResult]:
     """Run the tests of the rows, each once.
 
     Args:
         rows: Of the page.
         workspace: Root of the workspace.
         progress: Gets how many tests are done, and of how many.
+        jobs: Tests at the same time.
 
     Raises:
         TestsNotRunError: pytest itself failed.
@@ -70,6 +73,7 @@ def run_tests(rows: Sequence[FaultRow], workspace: Path, progress: Callable[[int
         file.touch()
         command = [sys.executable, "-m", "pytest", "-q", "--no-header", "--tb=line", "--continue-on-collection-errors"]
         command += ["-p", "no:cacheprovider", "-p", "studies.faults.pytest_results", *chosen]
+        command += ["-n", str(jobs), "--dist", "worksteal"] if jobs > 1 else []
         search_path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])  # the plugin too
         environment = os.environ | {FILE_VARIABLE: str(file), "PYTHONPATH": search_path}
         with (Path(folder) / "output").open("w+", encoding="utf-8") as output:

@@ -33,7 +33,8 @@ def row(name: str, *tests: str) -> FaultRow:
     return FaultRow(name, "P. Processes", "fault", "answer", tests)
 
 
-def test_rows_are_told_by_what_their_tests_said(tmp_path: Path) -> None:
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_rows_are_told_by_what_their_tests_said(tmp_path: Path, jobs: int) -> None:
     (tmp_path / "test_all.py").write_text(TESTS)
     (tmp_path / "pytest.ini").write_text("[pytest]\n")
     rows = [
@@ -44,7 +45,8 @@ def test_rows_are_told_by_what_their_tests_said(tmp_path: Path) -> None:
         row("P5", "absent.py::test_x"),
     ]
     seen: list[tuple[int, int]] = []
-    results = {result.row.id: result for result in run_tests(rows, tmp_path, lambda *reported: seen.append(reported))}
+    ran = run_tests(rows, tmp_path, lambda *reported: seen.append(reported), jobs)
+    results = {result.row.id: result for result in ran}
     assert {name: result.outcome for name, result in results.items()} == {
         "P1": "passed",
         "P2": "failed",
