@@ -12,6 +12,7 @@ from paramove.client import NoMessageError, NotConnectedError, Run, connect, mes
 from paramove.documents import InputError
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import Speech
+from tests.supervision.conftest import until
 
 STATUS = RelocationStatus
 
@@ -139,6 +140,33 @@ def test_a_stop_that_no_gate_answers_and_a_time_that_does_not_come_are_no_answer
         run.latest("rules")
     with pytest.raises(NotConnectedError):
         Run(folder).idle(0.1)
+
+
+def test_a_message_reaches_every_node_that_runs_and_subscribes(folder):
+    """Each connects in its own time; the recorder may well be the last."""
+    received, buses, threads = [], [], []
+
+    def listens(name, ready):
+        with Bus(name, BusSettings(folder=folder), (topics.SPEECH,)) as bus:
+            buses.append(bus)
+            bus.connect()
+            bus.ready("listens")
+            ready.set()
+            received.extend((name, one.message.text) for one in bus.events())
+
+    for name in ("first", "second", "third"):
+        ready = threading.Event()
+        threads.append(threading.Thread(target=listens, args=(name, ready)))
+        threads[-1].start()
+        assert ready.wait(60)
+    with connect() as run:
+        assert run.publish("speech", {"text": "all"}, wait_s=30.0)
+        until(lambda: len(received) == 3, "all have received it")
+    assert sorted(received) == [("first", "all"), ("second", "all"), ("third", "all")]
+    for bus in buses:
+        bus.stop()
+    for thread in threads:
+        thread.join()
 
 
 def test_in_simulated_time_messages_have_the_time_of_the_run(folder):

@@ -59,6 +59,52 @@ def test_settings_come_last_and_are_yaml(folder):
     assert parameters(launch) == {"rate_hz": 7.5, "lens": {"k1": 0.3, "k2": [1, 2]}, "name": "left"}
 
 
+def test_remaps_of_the_command_line_come_last(folder):
+    remaps = ["camera:camera/image=left/image", "camera:clock=left/clock"]
+    launch = load(folder, "good", None, remaps=remaps)
+    assert launch.file.nodes["camera"].remaps == {"camera/image": "left/image", "clock": "left/clock"}
+
+
+@pytest.mark.parametrize("remap", ["camera", "camera:", "camera:a", "camera:a=", ":a=b", "camera:=b"])
+def test_a_remap_in_another_form_is_rejected(folder, remap):
+    with pytest.raises(DocumentError, match="expected node:topic=topic"):
+        load(folder, "good", None, remaps=[remap])
+
+
+def test_a_remap_of_a_missing_node_names_the_nearest(folder):
+    with pytest.raises(DocumentError, match=r"--remap camra:a=b: .*did you mean 'camera'"):
+        load(folder, "good", None, remaps=["camra:a=b"])
+
+
+def test_an_overlay_is_laid_over_those_that_it_names_once_each(folder):
+    overlays = folder / "overlays"
+    (overlays / "fast.yaml").write_text("over: [slow]\nnodes: {camera: {parameters: {rate_hz: 60}}}\n")
+    (overlays / "zoom.yaml").write_text("nodes: {camera: {parameters: {lens: {k1: 0.5}}}}\n")
+    (overlays / "faster.yaml").write_text("over: [fast, slow, zoom]\nnodes: {camera: {parameters: {lens: {k2: 9}}}}\n")
+    launch = load(folder, "good", ["faster"])
+    assert launch.overlays == ("slow", "fast", "zoom", "faster")
+    assert parameters(launch) == {"rate_hz": 60, "lens": {"k1": 0.5, "k2": 9}}
+    assert load(folder, "good", ["slow", "fast"]).overlays == ("slow", "fast")
+
+
+@pytest.mark.parametrize(
+    ("over", "message"),
+    [
+        ("[fast]", "'fast' would lie over itself: fast over fast"),
+        ("[round]", "round.yaml:1:8: 'fast' would lie over itself: fast over round over fast"),
+        ("[slwo]", "there is no overlay 'slwo'"),
+        ("[../x]", "expected the plain name of an overlay"),
+        ("3", "expected a list of names"),
+    ],
+)
+def test_an_overlay_over_a_wrong_one_is_rejected_with_the_place(folder, over, message):
+    (folder / "overlays" / "fast.yaml").write_text(f"over: {over}\n")
+    (folder / "overlays" / "round.yaml").write_text("over: [fast]\n")
+    with pytest.raises(DocumentError) as error:
+        load(folder, "good", ["fast"])
+    assert message in str(error.value)
+
+
 def test_seed_goes_where_the_file_says(folder):
     assert load(folder, "good", seed=7).file.nodes["world"].parameters == {"seed": 7}
 

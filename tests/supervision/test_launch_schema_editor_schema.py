@@ -129,10 +129,11 @@ def test_schema_refuses_what_the_launcher_refuses(text):
     assert not conforms(document.data, schema, schema)
 
 
-def test_an_overlay_may_leave_out_and_remove_but_not_name_overlays():
+def test_an_overlay_may_leave_out_remove_and_lie_over_others_but_has_no_default_ones():
     schema = editor_schema("overlay")
     assert conforms({}, schema, schema)
     assert conforms({"nodes": {"a": None, "b": {"restart": None}}, "after_run": None}, schema, schema)
+    assert conforms({"over": ["sim"]}, schema, schema)
     assert not conforms({"default_overlays": ["sim"]}, schema, schema)
     assert not conforms({"nodes": {"a": {"restrat": "never"}}}, schema, schema)
 

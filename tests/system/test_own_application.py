@@ -10,6 +10,7 @@ import pytest
 
 from paramove.bus import topics
 from paramove.recording import read
+from tests.supervision.conftest import until
 
 BIN = Path(sys.executable).parent
 PARAMOVE = BIN / "paramove"
@@ -117,3 +118,27 @@ def test_the_bus_shows_a_running_application(folder):
     finally:
         launch.terminate()
         launch.communicate()
+
+
+def test_a_parameter_that_is_changed_in_lockstep_lands_at_its_recorded_time(folder, monkeypatch):
+    monkeypatch.setenv("PARAMOVE_DOMAIN", "default")
+    settings = ("--set", "driver.stiffness=1e-9", "--set", "world.ends_after_s=1e7")
+    launched = subprocess.Popen([PARAMOVE, "launch", "my_robot", *settings], cwd=folder, stdout=subprocess.DEVNULL)
+    try:
+        shown = ("topic", "echo", "cart/state", "--once", "--seconds", "1")
+        until(lambda: paramove(folder, *shown).returncode == 0, "the cart stands there")
+        done = paramove(folder, "param", "set", "driver", "stiffness", "4.0", "--wait", "30")
+        assert done.returncode == 0, done.stderr
+        assert launched.wait(60) == 0  # the cart has arrived
+    finally:
+        launched.terminate()
+        launched.wait(30)
+    requests, commands = [], []
+    for one in read(folder / "runs" / "latest" / "recording.mcap", ["parameters/set", "cart/command"]):
+        if one.topic == "cart/command":
+            commands.append((one.publish_ns, one.message.acceleration_m_s2))
+        else:
+            requests.append(one.message)
+    lands_ns = requests[-1].at.ToNanoseconds()  # earlier ones were late
+    assert all(abs(pull) < 1e-6 for now_ns, pull in commands if now_ns < lands_ns)
+    assert next(pull for now_ns, pull in commands if now_ns >= lands_ns) > 1.0

@@ -106,3 +106,10 @@ def test_persons_are_groups_where_there_are_several(examples):
     assert examples.groups == examples.subjects
     assert examples_of(a_set(subjects=("P1", "P2"))).groups is None
     assert examples.description("reaching").rate_hz == 50.0
+
+
+def test_two_thetas_are_too_few_to_leave_one_out():
+    thetas = [(0.3, -0.1, -0.1), (0.5, 0.2, -0.1)]
+    shown = DemonstrationSet(tuple(movement(theta) for theta in thetas))
+    with pytest.raises(ValueError, match=r"without one theta all others have the theta .*--leave-out none"):
+        leave_out(shaken(examples_of(shown)), lambda: LinearPHMM(5, 3, 7, resampled_frames=25))

@@ -3,6 +3,7 @@ from . import topics as topics
 from .barrier import LockstepBarrier as LockstepBarrier
 from .budget import RateBudget as RateBudget
 from .bus import Bus as Bus
+from .connecting import running_nodes as running_nodes
 from .endpoint import BusFolderError as BusFolderError
 from .endpoint import TopicTakenError as TopicTakenError
 from .endpoint import is_alive as is_alive

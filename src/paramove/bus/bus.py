@@ -14,6 +14,7 @@ from typing import Any, Literal, overload
 from paramove.bus import topics
 from paramove.bus.connecting import CONNECT_TIMEOUT_S
 from paramove.bus.exchange import Exchange, Marks
+from paramove.bus.live_parameters import LiveParameters
 from paramove.bus.lockstep import LockstepTicks, read_up_to
 from paramove.bus.settings import BusSettings
 from paramove.bus.status import StatusReporter
@@ -67,6 +68,7 @@ class Bus:
         self._backlog: list[Received] = []
         self._held: list[tuple[Topic, Any, int | None]] = []
         self._tick: Tick | None = None
+        self._live: LiveParameters | None = None
         self._frozen = False
         self._connect_s = 0.0  # left for waiting until connected
         try:
@@ -115,6 +117,12 @@ class Bus:
         self.exchange.subscribe(topic)
         if topic.name not in self._subscribed:
             self._subscribed.append(topic.name)
+
+    def follow(self, live: LiveParameters) -> None:
+        """Lets persons change parameters of the node while it runs, between two of its events."""
+        self._live = live
+        self._status.parameters = live.parameters
+        self.subscribe(topics.PARAMETERS_SET)
 
     def when_readable(self, descriptor: int, call: Callable[[], None]) -> None:
         """Calls `call`, in the bus's thread, as soon as `descriptor` can be read, even between two ticks.
@@ -362,10 +370,21 @@ class Bus:
         if iteration is None:
             return False
         messages, self._tick = iteration
-        self._backlog += messages
+        self._backlog += messages if self._live is None else self._without_requests(messages, self._live)
         if self._held and self._ticks.may_publish:
             self.release()
         return True
+
+    def _without_requests(self, messages: list[Received], live: LiveParameters) -> list[Received]:
+        """What the node gets of these messages; changes of its parameters are made, and its status tells them."""
+        requests = [received for received in messages if received.topic is topics.PARAMETERS_SET]
+        is_answered = False
+        for received in requests:
+            is_answered |= live.receive(received.message, self.now_ns)
+        if live.land(self.now_ns) or is_answered:
+            self._status.parameters = live.parameters
+            self._status.publish(self.now_ns)
+        return [received for received in messages if received.topic is not topics.PARAMETERS_SET]
 
     def _trim_backlog(self) -> None:
         """Drops the oldest messages that no loop took, beyond the high water mark of their topic."""

@@ -20,12 +20,13 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from paramove.bus.bus import Bus
 from paramove.bus.endpoint import BusFolderError, TopicTakenError
+from paramove.bus.live_parameters import LiveParameters
 from paramove.bus.log_format import log_to_stderr
 from paramove.bus.settings import BusSettings
 from paramove.bus.signals import handle_signals
@@ -41,9 +42,15 @@ LAST_STATUS_TIMEOUT_S = 1.0
 
 
 class NodeConfig(OldNames):
-    """Parameters of a node; each node derives its own. Unknown keys are rejected."""
+    """Parameters of a node; each node derives its own. Unknown keys are rejected.
+
+    `CHANGEABLE` names those that a person may change while the node runs: the node reads them from its configuration
+    whenever it uses them.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    CHANGEABLE: ClassVar[tuple[str, ...]] = ()
 
 
 class NodeFile(BaseModel):
@@ -118,6 +125,7 @@ def main(
         sys.exit(exit_codes.CONFIGURATION)
     log_to_stderr(file.node)
     try:
+        live = LiveParameters(file.node, config, config.CHANGEABLE)
         bus = Bus(file.node, file.bus, subscribes, publishes, file.run_folder)
     except (TopicTakenError, BusFolderError) as error:
         _log.error("%s", error)
@@ -126,6 +134,8 @@ def main(
         _log.error("%s", error)
         sys.exit(exit_codes.CONFIGURATION)
     with bus:
+        if config.CHANGEABLE:
+            bus.follow(live)
         code = _run(run, bus, config, visitor)
         if code != exit_codes.OK:
             bus.wait_for_subscriber(LAST_STATUS_TIMEOUT_S)

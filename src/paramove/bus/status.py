@@ -9,7 +9,7 @@ from paramove.bus.endpoint import Ownership
 from paramove.bus.exchange import Exchange
 from paramove.bus.sequence import SequenceCounter
 from paramove.bus.topics import status
-from paramove.msgs.node_status_pb2 import NodeStatus, TopicCount
+from paramove.msgs.node_status_pb2 import NodeParameter, NodeStatus, TopicCount
 
 _log = logging.getLogger(__name__)
 
@@ -25,6 +25,7 @@ class StatusReporter:
         state: Latest state published.
         processing_ns: Time the node has spent on messages and ticks, on the wall clock.
         processed: How many it has handled.
+        parameters: Those of the node that may change while it runs.
     """
 
     def __init__(self, exchange: Exchange, node: str) -> None:
@@ -35,6 +36,7 @@ class StatusReporter:
         self._message = ""
         self.processing_ns = 0
         self.processed = 0
+        self.parameters: list[NodeParameter] = []
 
     @property
     def ownership(self) -> Ownership:
@@ -66,6 +68,7 @@ class StatusReporter:
             pid=os.getpid(),
             processing_seconds=self.processing_ns * 1e-9,
             processed=self.processed,
+            parameters=self.parameters,
         )
         status_message.captured.FromNanoseconds(now_ns)
         for publisher in self._exchange.publishers.values():

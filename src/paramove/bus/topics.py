@@ -29,6 +29,7 @@ from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.motor_status_pb2 import MotorStatus
 from paramove.msgs.node_status_pb2 import NodeStatus
+from paramove.msgs.parameters_pb2 import ParameterRequest
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
@@ -212,6 +213,8 @@ OPERATOR_ESTOP = replace(OPERATOR_STOP, name="operator/estop")
 OPERATOR_ARM_AWAY = replace(OPERATOR_ARM, name="operator/arm_away", recorded=False)
 OPERATOR_STOP_AWAY = replace(OPERATOR_STOP, name="operator/stop_away", recorded=False)
 """From persons at other hosts, by this host's relay; recorded under the names that they have there."""
+PARAMETERS_SET = Topic("parameters/set", ParameterRequest, None, _QUEUE, recorded=True, limit_hz=20)
+"""From persons and programs outside of a run, to all nodes whose parameters may change while they run."""
 HOSTS_LINK = Topic("hosts/link", LinkState, 100, _QUEUE)
 WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES)
 WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=True)

@@ -18,7 +18,7 @@ import typer
 
 from paramove.workspace import Workspace
 
-_WITH_VALUE = ("--set", "--seed", "--runs", "--robot")
+_WITH_VALUE = ("--set", "--remap", "--seed", "--runs", "--robot")
 
 
 def launch_files() -> list[str]:
@@ -47,6 +47,11 @@ RobotOption = Annotated[
         autocompletion=robots,
     ),
 ]
+
+
+def modules() -> list[str]:
+    """Modules of the workspace's nodes."""
+    return [f"nodes.{name}" for name in Workspace.here().names("nodes", "*.py") if not name.startswith("_")]
 
 
 def schemas() -> list[str]:

@@ -51,6 +51,14 @@ def launch(
             autocompletion=completions.parameters,
         ),
     ] = None,
+    remaps: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--remap",
+            metavar="NODE:TOPIC=TOPIC",
+            help="let a node use another topic in the place of one; may be repeated",
+        ),
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="seed of the world", min=0)] = None,
     robot: completions.RobotOption = None,
     headless: Annotated[bool, typer.Option("--headless", help="lines instead of the live table, and no video")] = False,
@@ -59,6 +67,9 @@ def launch(
     ] = False,
     runs: Annotated[Path | None, typer.Option(help="where the run folder is made (default: runs/)")] = None,
     check: Annotated[bool, typer.Option("--check", help="check the launch file and its nodes, start nothing")] = False,
+    show_arguments: Annotated[
+        bool, typer.Option("--show-args", help="show the parameters that --set can change, start nothing")
+    ] = False,
     schema: Annotated[
         str | None,
         typer.Option(
@@ -80,8 +91,9 @@ def launch(
     from paramove.cli.one_run import run  # heavy, and not needed to complete a line or to print help
 
     code = run(
-        name, overlays, settings or [],
+        name, overlays, settings or [], remaps or [],
         seed=seed, headless=headless, runs=runs, page=page, robot=robot, check_only=check,
+        show_arguments=show_arguments,
     )  # fmt: skip
     raise typer.Exit(code)
 

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import typer
@@ -34,10 +34,12 @@ from paramove.supervision import (
     TableView,
     View,
     application,
+    arguments,
     examined,
     load,
     missing_files,
     overlay_folders,
+    read_interfaces,
 )
 from paramove.workspace import Workspace
 
@@ -49,6 +51,7 @@ def run(
     name: str,
     overlays: Sequence[str] | None,
     settings: Sequence[str],
+    remaps: Sequence[str],
     *,
     seed: int | None,
     headless: bool,
@@ -56,11 +59,39 @@ def run(
     page: bool,
     robot: str | None,
     check_only: bool,
+    show_arguments: bool,
 ) -> int:
-    """Runs an application, or only checks it; returns the exit code. Never waits for the terminal.
+    """Runs an application, or only checks or describes it; returns the exit code. Never waits for the terminal.
 
     Args:
         name: Of the launch file; this and all others as the options of `paramove launch`.
+    """
+
+    def loaded(workspace: Workspace) -> Launch:
+        chosen, given = overlays, settings
+        if page:
+            chosen, title = with_page(workspace, name, overlays)
+            given = [title, *settings]
+        return load(workspace, name, chosen, given, seed, headless, robot, remaps)
+
+    look = _checked if check_only else _arguments if show_arguments else None
+    return run_loaded(loaded, headless=headless, runs=runs, page=page, look=look)
+
+
+def run_loaded(
+    loaded: Callable[[Workspace], Launch],
+    *,
+    headless: bool = True,
+    runs: Path | None = None,
+    page: bool = False,
+    look: Callable[[Launch, Workspace, Environment], list[str]] | None = None,
+) -> int:
+    """As `run`, what a function reads or makes in the workspace.
+
+    Args:
+        loaded: The function.
+        headless, runs, page: As the options of `paramove launch`.
+        look: What is printed of the application, which is not run then.
     """
     with QueuedOutput() as output:
         console = Console(highlight=False, markup=False, emoji=False)
@@ -71,14 +102,9 @@ def run(
             environment = examined(os.environ, workspace)
             for note in environment.notes:
                 errors.print(f"note: {note}")
-            if page:
-                overlays, title = with_page(workspace, name, overlays)
-                settings = [title, *settings]
-            launch = load(workspace, name, overlays, settings, seed, headless, robot)
-            if check_only:
-                application.check(launch, workspace)
-                _check_robots(launch)
-                console.print("\n".join(_found(launch, environment, workspace)), soft_wrap=True)
+            launch = loaded(workspace)
+            if look is not None:
+                console.print("\n".join(look(launch, workspace, environment)), soft_wrap=True)
                 return exit_codes.OK
             with tempfile.TemporaryDirectory() as set_up:
                 pages = Path(set_up)
@@ -187,8 +213,18 @@ def _check_robots(launch: Launch) -> None:
             check_grip(robot, robot.model_path.parent / scene)
 
 
-def _found(launch: Launch, environment: Environment, workspace: Workspace) -> list[str]:
-    """What a run would use, line by line."""
+def _arguments(launch: Launch, workspace: Workspace, environment: Environment) -> list[str]:
+    """The parameters that `--set` can change: name, value, type."""
+    found = arguments(launch, read_interfaces(launch, workspace), workspace)
+    rows = [(one.name, printable(one.value) or "(needed)", one.kind) for one in found]
+    widths = [max(map(len, texts)) for texts in zip(*rows, strict=True)]
+    return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def _checked(launch: Launch, workspace: Workspace, environment: Environment) -> list[str]:
+    """Checks all that can be checked before a start: what a run would use, line by line."""
+    application.check(launch, workspace)
+    _check_robots(launch)
     seeds = f", seed {launch.seed}" if launch.seed is not None else ""
     clock = f"{launch.file.bus.clock}{', lockstep' if launch.file.bus.lockstep else ''}"
     return [

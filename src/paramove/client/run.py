@@ -9,7 +9,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self
 
-from paramove.bus import BusVisitor, Publisher, Received, Subscriber, Topic, inspection, running_folder, topics
+from paramove.bus import (
+    BusVisitor,
+    Publisher,
+    Received,
+    Subscriber,
+    Topic,
+    inspection,
+    running_folder,
+    running_nodes,
+    topics,
+)
 from paramove.client.content import message_of
 from paramove.documents import InputError
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
@@ -48,22 +58,26 @@ class Run:
     Args:
         folder: Of the run's bus.
         name: Of this program.
+
+    Attributes:
+        name: As given.
+        is_simulated: Whether the run's time is simulated; known once connected.
     """
 
     def __init__(self, folder: Path, name: str = "client") -> None:
-        self._folder, self._name = folder, name
+        self._folder, self.name = folder, name
         self._subscribers: dict[str, Subscriber] = {}
         self._publishers: dict[str, Publisher] = {}
         self._received: dict[str, deque[Received]] = {}
         self._latest: dict[str, Received] = {}
         self._now_ns = 0
-        self._is_simulated = False
+        self.is_simulated = False
         self._open_visitor: BusVisitor | None = None
 
     def __enter__(self) -> Self:
-        self._open_visitor = BusVisitor(self._folder, self._name)
-        self._is_simulated = inspection.publisher_of(self._folder, topics.CLOCK).alive
-        if self._is_simulated:
+        self._open_visitor = BusVisitor(self._folder, self.name)
+        self.is_simulated = inspection.publisher_of(self._folder, topics.CLOCK).alive
+        if self.is_simulated:
             self._subscribe(topics.CLOCK)
         return self
 
@@ -77,7 +91,7 @@ class Run:
 
         Raises NoMessageError if simulated time is not known and does not come within 2 s.
         """
-        if not self._is_simulated:
+        if not self.is_simulated:
             return time.monotonic_ns()
         self._step(0.0)
         self._until(lambda: topics.CLOCK.name in self._latest, _CLOCK_S)
@@ -145,12 +159,19 @@ class Run:
         return publisher.subscriptions > 0
 
     def wait_for_subscribers(self, publishers: Iterable[Publisher], wait_s: float) -> bool:
-        """Waits until each of them has a subscriber, in simulated time also until that is known; whether one has."""
+        """Waits until each of them has a subscriber, and all nodes that run and subscribe to it; whether one has.
+
+        In simulated time it also waits until that is known.
+        """
         offered = list(publishers)
+        running = running_nodes(self._folder)
+        expected = {one.name: {node.node for node in running if one.name in node.subscribes} for one in offered}
 
         def is_on() -> bool:
-            knows_the_time = self._now_ns > 0 or not self._is_simulated
-            return knows_the_time and all(one.subscriptions for one in offered)
+            knows_the_time = self._now_ns > 0 or not self.is_simulated
+            return knows_the_time and all(
+                one.subscriptions and expected[one.name] <= one.subscribers for one in offered
+            )
 
         self._until(is_on, wait_s)
         return any(one.subscriptions for one in offered)
@@ -175,7 +196,7 @@ class Run:
         """
         message = RelocationGoal()
         message.CopyFrom(message_of(RelocationGoal, goal) if isinstance(goal, str | Mapping) else goal)
-        message.id = message.id or f"{self._name} {time.monotonic_ns()}"
+        message.id = message.id or f"{self.name} {time.monotonic_ns()}"
         message.attempt = message.attempt or 1
         status_topic = self._subscribe(topics.RELOCATION_STATUS)
         self._received[status_topic.name].clear()
@@ -198,7 +219,7 @@ class Run:
         Raises NoMessageError if there was none in time: then nobody knows that the arm stops. TopicTakenError as
         `stop_arm` does.
         """
-        answer = stop_arm(self._folder, self._name, timeout_s)
+        answer = stop_arm(self._folder, self.name, timeout_s)
         if answer is None:
             raise NoMessageError(
                 f"no safety gate has answered the stop within {timeout_s:g} s: the arm may still move; use the switch "

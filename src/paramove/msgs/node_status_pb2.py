@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1fparamove/msgs/node_status.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xb4\x03\n\nNodeStatus\x12\x0c\n\x04node\x18\x01 \x01(\t\x12.\n\x05state\x18\x02 \x01(\x0e\x32\x1f.paramove.msgs.NodeStatus.State\x12\x0e\n\x06\x64\x65tail\x18\x03 \x01(\t\x12\x0b\n\x03pid\x18\x04 \x01(\r\x12,\n\x08\x63\x61ptured\x18\x05 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x1a\n\x12processing_seconds\x18\x06 \x01(\x01\x12\x11\n\tprocessed\x18\x07 \x01(\x04\x12,\n\tpublished\x18\x08 \x03(\x0b\x32\x19.paramove.msgs.TopicCount\x12+\n\x08received\x18\t \x03(\x0b\x32\x19.paramove.msgs.TopicCount\"|\n\x05State\x12\x15\n\x11STATE_UNSPECIFIED\x10\x00\x12\x12\n\x0eSTATE_STARTING\x10\x01\x12\x0f\n\x0bSTATE_READY\x10\x02\x12\x12\n\x0eSTATE_DEGRADED\x10\x03\x12\x10\n\x0cSTATE_FAILED\x10\x04\x12\x11\n\rSTATE_STOPPED\x10\x05R\x08sentenceR\x04saidR\x05heard\"i\n\nTopicCount\x12\r\n\x05topic\x18\x01 \x01(\t\x12\x10\n\x08messages\x18\x02 \x01(\x04\x12\x0c\n\x04lost\x18\x03 \x01(\x04\x12\x11\n\trepeated_\x18\x04 \x01(\x04\x12\x10\n\x08rejected\x18\x05 \x01(\x04R\x07refusedb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1fparamove/msgs/node_status.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xe6\x03\n\nNodeStatus\x12\x0c\n\x04node\x18\x01 \x01(\t\x12.\n\x05state\x18\x02 \x01(\x0e\x32\x1f.paramove.msgs.NodeStatus.State\x12\x0e\n\x06\x64\x65tail\x18\x03 \x01(\t\x12\x0b\n\x03pid\x18\x04 \x01(\r\x12,\n\x08\x63\x61ptured\x18\x05 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x1a\n\x12processing_seconds\x18\x06 \x01(\x01\x12\x11\n\tprocessed\x18\x07 \x01(\x04\x12,\n\tpublished\x18\x08 \x03(\x0b\x32\x19.paramove.msgs.TopicCount\x12+\n\x08received\x18\t \x03(\x0b\x32\x19.paramove.msgs.TopicCount\x12\x30\n\nparameters\x18\n \x03(\x0b\x32\x1c.paramove.msgs.NodeParameter\"|\n\x05State\x12\x15\n\x11STATE_UNSPECIFIED\x10\x00\x12\x12\n\x0eSTATE_STARTING\x10\x01\x12\x0f\n\x0bSTATE_READY\x10\x02\x12\x12\n\x0eSTATE_DEGRADED\x10\x03\x12\x10\n\x0cSTATE_FAILED\x10\x04\x12\x11\n\rSTATE_STOPPED\x10\x05R\x08sentenceR\x04saidR\x05heard\"\x8e\x01\n\rNodeParameter\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\t\x12\x12\n\nrequest_id\x18\x03 \x01(\t\x12\x11\n\trejection\x18\x04 \x01(\t\x12\x0c\n\x04late\x18\x06 \x01(\x08\x12+\n\x07\x63hanged\x18\x05 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\"i\n\nTopicCount\x12\r\n\x05topic\x18\x01 \x01(\t\x12\x10\n\x08messages\x18\x02 \x01(\x04\x12\x0c\n\x04lost\x18\x03 \x01(\x04\x12\x11\n\trepeated_\x18\x04 \x01(\x04\x12\x10\n\x08rejected\x18\x05 \x01(\x04R\x07refusedb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -33,9 +33,11 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'paramove.msgs.node_status_p
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_NODESTATUS']._serialized_start=84
-  _globals['_NODESTATUS']._serialized_end=520
-  _globals['_NODESTATUS_STATE']._serialized_start=373
-  _globals['_NODESTATUS_STATE']._serialized_end=497
-  _globals['_TOPICCOUNT']._serialized_start=522
-  _globals['_TOPICCOUNT']._serialized_end=627
+  _globals['_NODESTATUS']._serialized_end=570
+  _globals['_NODESTATUS_STATE']._serialized_start=423
+  _globals['_NODESTATUS_STATE']._serialized_end=547
+  _globals['_NODEPARAMETER']._serialized_start=573
+  _globals['_NODEPARAMETER']._serialized_end=715
+  _globals['_TOPICCOUNT']._serialized_start=717
+  _globals['_TOPICCOUNT']._serialized_end=822
 # @@protoc_insertion_point(module_scope)

@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class NodeStatus(_message.Message):
-    __slots__ = ("node", "state", "detail", "pid", "captured", "processing_seconds", "processed", "published", "received")
+    __slots__ = ("node", "state", "detail", "pid", "captured", "processing_seconds", "processed", "published", "received", "parameters")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_UNSPECIFIED: _ClassVar[NodeStatus.State]
@@ -32,6 +32,7 @@ class NodeStatus(_message.Message):
     PROCESSED_FIELD_NUMBER: _ClassVar[int]
     PUBLISHED_FIELD_NUMBER: _ClassVar[int]
     RECEIVED_FIELD_NUMBER: _ClassVar[int]
+    PARAMETERS_FIELD_NUMBER: _ClassVar[int]
     node: str
     state: NodeStatus.State
     detail: str
@@ -41,7 +42,24 @@ class NodeStatus(_message.Message):
     processed: int
     published: _containers.RepeatedCompositeFieldContainer[TopicCount]
     received: _containers.RepeatedCompositeFieldContainer[TopicCount]
-    def __init__(self, node: _Optional[str] = ..., state: _Optional[_Union[NodeStatus.State, str]] = ..., detail: _Optional[str] = ..., pid: _Optional[int] = ..., captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., processing_seconds: _Optional[float] = ..., processed: _Optional[int] = ..., published: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ..., received: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ...) -> None: ...
+    parameters: _containers.RepeatedCompositeFieldContainer[NodeParameter]
+    def __init__(self, node: _Optional[str] = ..., state: _Optional[_Union[NodeStatus.State, str]] = ..., detail: _Optional[str] = ..., pid: _Optional[int] = ..., captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., processing_seconds: _Optional[float] = ..., processed: _Optional[int] = ..., published: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ..., received: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ..., parameters: _Optional[_Iterable[_Union[NodeParameter, _Mapping]]] = ...) -> None: ...
+
+class NodeParameter(_message.Message):
+    __slots__ = ("name", "value", "request_id", "rejection", "late", "changed")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    VALUE_FIELD_NUMBER: _ClassVar[int]
+    REQUEST_ID_FIELD_NUMBER: _ClassVar[int]
+    REJECTION_FIELD_NUMBER: _ClassVar[int]
+    LATE_FIELD_NUMBER: _ClassVar[int]
+    CHANGED_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    value: str
+    request_id: str
+    rejection: str
+    late: bool
+    changed: _timestamp_pb2.Timestamp
+    def __init__(self, name: _Optional[str] = ..., value: _Optional[str] = ..., request_id: _Optional[str] = ..., rejection: _Optional[str] = ..., late: bool = ..., changed: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
 
 class TopicCount(_message.Message):
     __slots__ = ("topic", "messages", "lost", "repeated_", "rejected")

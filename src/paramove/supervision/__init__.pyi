@@ -27,9 +27,11 @@ from .graph import running_graph as running_graph
 from .graph_svg import as_svg as as_svg
 from .interfaces import InterfaceError as InterfaceError
 from .interfaces import read_interface as read_interface
+from .joining import join as join
 from .launch_file import Launch as Launch
 from .launch_file import LaunchFileMissingError as LaunchFileMissingError
 from .launch_file import load as load
+from .launch_file import node_alone as node_alone
 from .launch_file import overlay_folders as overlay_folders
 from .launch_schema import FILES as FILES
 from .launch_schema import HostSettings as HostSettings
@@ -41,6 +43,8 @@ from .messages import NodeRow as NodeRow
 from .messages import Request as Request
 from .needs import MissingFile as MissingFile
 from .needs import missing_files as missing_files
+from .parameters import Argument as Argument
+from .parameters import arguments as arguments
 from .processes import NICE as NICE
 from .processes import prioritise as prioritise
 from .queued_output import QueuedOutput as QueuedOutput
@@ -56,3 +60,4 @@ from .supervisor import Outcome as Outcome
 from .supervisor import View as View
 from .view import LineView as LineView
 from .view import TableView as TableView
+from .wiring import read_interfaces as read_interfaces

@@ -64,6 +64,7 @@ def load(
     seed: int | None = None,
     headless: bool = False,
     robot: str | None = None,
+    remaps: Sequence[str] = (),
 ) -> Launch:
     """Reads `launch/<name>.yaml` with its overlays and settings and checks the result.
 
@@ -78,6 +79,7 @@ def load(
         robot: Written into the parameter `robot` of each node for which the files give one, before `settings`. For one
             with a chain of servos the overlay `servo_arm` is laid on top, if the launch file has one, with each
             `servo_arm_NAME` that there is for an overlay NAME.
+        remaps: Each `node:topic=topic on the bus`.
 
     Raises LaunchFileMissingError, or DocumentError with all that is wrong.
     """
@@ -85,6 +87,8 @@ def load(
     document, chosen = _with_overlays(workspace, path.stem, _read(path), overlays, robot)
     given = [topics.present_names(setting) for setting in settings]
     document, findings = _with_values(document, given, seed, headless, overlays is not None, robot)
+    document, wrong_remaps = _with_remaps(document, [topics.present_names(remap) for remap in remaps])
+    findings += wrong_remaps
     try:
         file = validated(document)
     except DocumentError as error:
@@ -94,45 +98,121 @@ def load(
     return Launch(Path(name).stem, tuple(chosen), file, document, seed, headless)
 
 
+def node_alone(
+    workspace: Workspace, module: str, name: str = "", settings: Sequence[str] = (), remaps: Sequence[str] = ()
+) -> Launch:
+    """A launch file of one node, whose end is the end of the run and which may miss the publishers of its topics.
+
+    Args:
+        workspace: Where the module is found.
+        module: Such as nodes.camera.
+        name: Of the node; default: the last part of the module.
+        settings: Each `parameter=value`; the value is YAML.
+        remaps: Each `topic=topic on the bus`.
+
+    Raises DocumentError with all that is wrong.
+    """
+    name = name or module.rpartition(".")[2]
+    node = {"module": module, "optional_topics": ["*"], "ends_run": True}
+    document = Document({"nodes": {name: node}}, {(): Position(module)})
+    given = [topics.present_names(f"{name}.{setting}") for setting in settings]
+    document, findings = _with_values(document, given, None, False, False, None)
+    document, wrong_remaps = _with_remaps(document, [topics.present_names(f"{name}:{remap}") for remap in remaps])
+    findings += wrong_remaps
+    try:
+        file = validated(document)
+    except DocumentError as error:
+        findings.append(error)
+    raise_any(findings)
+    return Launch(name, (), file, document)
+
+
 def _with_overlays(
     workspace: Workspace, name: str, document: Document, overlays: Sequence[str] | None, robot: str | None
 ) -> tuple[Document, list[str]]:
     """The document with its overlays, and their names; raises DocumentError with what is wrong in any of them."""
-    paths, findings = [], []
     folders = overlay_folders(name)
     if overlays is None:
-        chosen = document.data.get("default_overlays", [])
-        if not isinstance(chosen, list) or not all(isinstance(overlay, str) for overlay in chosen):
-            raise document.error(("default_overlays",), f"expected a list of names of overlays, found {chosen!r:.80}")
-        for index, overlay in enumerate(chosen):
-            key_path = ("default_overlays", str(index))
-            if not is_identifier(overlay):
-                message = f"{overlay!r}: expected the plain name of an overlay in {folders[-1]}, no path"
-                findings.append(document.error(key_path, message))
-            elif not (path := _named(workspace, folders, overlay)).is_file():
-                message = f"there is no overlay '{overlay}' ({path}); {nearest(overlay, _known(workspace, folders))}"
-                findings.append(document.error(key_path, message))
-            else:
-                paths.append(path)
+        chosen, findings = _default_overlays(workspace, folders, document)
     else:
-        chosen = list(overlays)
-        paths = [_typed(workspace, folders, overlay, "overlay") for overlay in chosen]
+        chosen = {overlay: _typed(workspace, folders, overlay, "overlay") for overlay in overlays}
+        findings = []
     if robot is not None and SERVO_ARM in workspace.names(folders[0]) and _has_chain(workspace, robot):
         names = [SERVO_ARM, *(f"{SERVO_ARM}_{overlay}" for overlay in chosen)]
-        laid = {name: path for name in names if (path := _named(workspace, folders, name)).is_file()}
-        chosen, paths = [*chosen, *laid], [*paths, *laid.values()]
-    for path in paths:
+        chosen |= {name: path for name in names if (path := _named(workspace, folders, name)).is_file()}
+    laid_on = dict[str, Path]()
+    for overlay, path in chosen.items():
         try:
-            top = _read(path)
+            for top in _overlay(workspace, folders, overlay, path, laid_on):
+                document = document.overlaid(top)
         except DocumentError as error:
             findings.append(error)
-            continue
-        if "default_overlays" in top.data:
-            message = "an overlay names no other overlays; name both in the launch file or with --with"
-            findings.append(top.error(("default_overlays",), message))
-        document = document.overlaid(top)
     raise_any(findings)
-    return document, chosen
+    return document, list(laid_on)
+
+
+def _default_overlays(
+    workspace: Workspace, folders: Sequence[Path], document: Document
+) -> tuple[dict[str, Path], list[DocumentError]]:
+    """Name and file of each overlay that a launch file has without `--with`, and what is wrong with them."""
+    names = document.data.get("default_overlays", [])
+    if not isinstance(names, list) or not all(isinstance(overlay, str) for overlay in names):
+        raise document.error(("default_overlays",), f"expected a list of names of overlays, found {names!r:.80}")
+    chosen, findings = {}, []
+    for index, overlay in enumerate(names):
+        try:
+            chosen[overlay] = _by_name(workspace, folders, document, ("default_overlays", str(index)), overlay)
+        except DocumentError as error:
+            findings.append(error)
+    return chosen, findings
+
+
+def _by_name(workspace: Workspace, folders: Sequence[Path], document: Document, key: KeyPath, overlay: str) -> Path:
+    """File of an overlay that a file names; raises DocumentError."""
+    if not is_identifier(overlay):
+        raise document.error(key, f"{overlay!r}: expected the plain name of an overlay in {folders[-1]}, no path")
+    path = _named(workspace, folders, overlay)
+    if not path.is_file():
+        message = f"there is no overlay '{overlay}' ({path}); {nearest(overlay, _known(workspace, folders))}"
+        raise document.error(key, message)
+    return path
+
+
+def _overlay(
+    workspace: Workspace,
+    folders: Sequence[Path],
+    name: str,
+    path: Path,
+    laid_on: dict[str, Path],
+    above: tuple[str, ...] = (),
+) -> Iterator[Document]:
+    """An overlay, after those that its key `over` names: they are laid below it.
+
+    Args:
+        workspace, folders: Where overlays are.
+        name, path: Of the overlay.
+        laid_on: Those that have been laid on before; each is laid on once.
+        above: Names of those that lie over it.
+
+    Raises DocumentError for an overlay that cannot be read, names one that there is not, or lies over itself.
+    """
+    if path in laid_on.values():
+        return
+    document = _read(path)
+    if "default_overlays" in document.data:
+        message = "an overlay has no default overlays; those that belong below it are named by its key 'over'"
+        raise document.error(("default_overlays",), message)
+    below = document.data.pop("over", [])
+    if not isinstance(below, list) or not all(isinstance(other, str) for other in below):
+        raise document.error(("over",), f"expected a list of names of overlays, found {below!r:.80}")
+    for index, other in enumerate(below):
+        key = ("over", str(index))
+        if other in (*above, name):
+            raise document.error(key, f"'{other}' would lie over itself: {' over '.join((*above, name, other))}")
+        beneath = _by_name(workspace, folders, document, key, other)
+        yield from _overlay(workspace, folders, other, beneath, laid_on, (*above, name))
+    laid_on[name] = path
+    yield document
 
 
 def _with_values(
@@ -195,6 +275,25 @@ def _with_values(
             findings.append(DocumentError(where, message))
         elif all(parameters) and parameters:  # otherwise `_wrong_references` reports it
             document = document.overlaid(_parameter(node, parameters, value, where))
+    return document, findings
+
+
+def _with_remaps(document: Document, remaps: Sequence[str]) -> tuple[Document, list[DocumentError]]:
+    """The document with the remaps of the command line, each `node:topic=topic on the bus`, and the errors in these."""
+    findings = []
+    nodes = _mapping_at(document, "nodes")
+    for remap in remaps:
+        where = Position(f"--remap {remap}")
+        node, colon, names = remap.partition(":")
+        topic, equals, target = names.partition("=")
+        if not (node and colon and topic and equals and target):
+            message = "expected node:topic=topic, such as recognizer:objects/tracked=left/objects"
+            findings.append(DocumentError(where, message))
+        elif node not in nodes:
+            findings.append(DocumentError(where, f"there is no node '{node}'; {nearest(node, nodes)}"))
+        else:
+            path = ("nodes", node, "remaps", topic)
+            document = document.overlaid(Document({"nodes": {node: {"remaps": {topic: target}}}}, {path: where}))
     return document, findings
 
 

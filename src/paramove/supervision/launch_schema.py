@@ -175,7 +175,8 @@ def _overlay() -> dict[str, Any]:
     schema = _launch()
     schema["title"] = "paramove overlay"
     schema["description"] = "Laid over a launch file: mappings merge, all else is replaced, null removes a key."
-    del schema["properties"]["default_overlays"]
+    schema["properties"]["over"] = schema["properties"].pop("default_overlays")
+    schema["properties"]["over"]["description"] = "overlays that are laid below this one, if they are not yet"
     nodes = schema["properties"]["nodes"]
     nodes.pop("minProperties", None)
     nodes["patternProperties"] = {

@@ -10,17 +10,20 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import importlib
+import inspect
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from platformdirs import user_cache_path
 from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic_core import ErrorDetails, to_jsonable_python
 
 from paramove.documents import DocumentError, keys_at, nearest
 from paramove.source_code import code_digest
@@ -31,6 +34,7 @@ from paramove.workspace import Workspace
 
 TIMEOUT_S = 120.0
 """For importing the modules, on a busy machine with cold caches."""
+DESCRIBE = "--describe"
 _ToCheck = tuple[str, str, dict[str, Any]]
 """Node, module, parameters."""
 
@@ -66,6 +70,37 @@ def wrong_parameters(
             passed.touch()
 
 
+@dataclass(frozen=True)
+class Argument:
+    """A parameter of a node that `--set` can change.
+
+    Attributes:
+        name: node.parameter.
+        value: As JSON: that of the launch file, else the node's default; "" for a parameter that needs one.
+        kind: Its type, as Python writes it.
+    """
+
+    name: str
+    value: str
+    kind: str
+
+
+def arguments(launch: Launch, interfaces: Mapping[str, Interface], workspace: Workspace) -> list[Argument]:
+    """The parameters of all nodes, in their order; raises DocumentError for a module that cannot be imported."""
+    nodes: list[_ToCheck] = [
+        (name, launch.file.nodes[name].module, {}) for name, its in interfaces.items() if its.has_config
+    ]
+    found = []
+    for (name, module, _), answer in zip(nodes, _check_in_process(nodes, workspace, DESCRIBE), strict=False):
+        if isinstance(answer, str):
+            raise launch.error(("nodes", name, "module"), f"'{module}' cannot be imported: {answer}")
+        given = launch.file.nodes[name].parameters
+        for parameter, default, kind in answer:
+            value = json.dumps(given[parameter], ensure_ascii=False) if parameter in given else default
+            found.append(Argument(f"{name}.{parameter}", value, kind))
+    return found
+
+
 def _passed_before(
     to_check: Sequence[_ToCheck], interfaces: Mapping[str, Interface], workspace: Workspace
 ) -> Path | None:
@@ -77,10 +112,12 @@ def _passed_before(
     return user_cache_path("paramove") / "checked" / hashlib.sha256(key.encode()).hexdigest()
 
 
-def _check_in_process(to_check: Sequence[_ToCheck], workspace: Workspace) -> list[Any]:
+def _check_in_process(to_check: Sequence[_ToCheck], workspace: Workspace, *options: str) -> list[Any]:
     """Answers of a process that imports the modules in turn; the last one is how it ended if one is missing."""
     try:
-        process = run_python("-m", __name__, workspace=workspace, timeout_s=TIMEOUT_S, stdin=json.dumps(to_check))
+        process = run_python(
+            "-m", __name__, *options, workspace=workspace, timeout_s=TIMEOUT_S, stdin=json.dumps(to_check)
+        )
         output, errors = process.stdout, process.stderr.strip().splitlines()
         ending = errors[-1] if errors else f"the process ended with exit code {process.returncode}"
     except subprocess.TimeoutExpired as error:
@@ -92,17 +129,38 @@ def _check_in_process(to_check: Sequence[_ToCheck], workspace: Workspace) -> lis
 
 def _answer(module: str, parameters: dict[str, Any]) -> str | list[tuple[list[str], str]]:
     """Position and message of each error in the parameters, or why the module cannot be imported."""
-    try:
-        config = getattr(importlib.import_module(module), "Config", None)
-    except (Exception, SystemExit) as error:  # an import may do anything; its error is reported
-        return f"{type(error).__name__}: {error}"
-    if not isinstance(config, type) or not issubclass(config, BaseModel):
-        return []
+    config = _config_of(module)
+    if config is None or isinstance(config, str):
+        return config or []
     try:
         config.model_validate(parameters)
     except ValidationError as error:
         return [_finding(config, details) for details in error.errors()]
     return []
+
+
+def _config_of(module: str) -> type[BaseModel] | str | None:
+    """The Config of a node, None without one; why the module cannot be imported."""
+    try:
+        config = getattr(importlib.import_module(module), "Config", None)
+    except (Exception, SystemExit) as error:  # an import may do anything; its error is reported
+        return f"{type(error).__name__}: {error}"
+    return config if isinstance(config, type) and issubclass(config, BaseModel) else None
+
+
+def _description(module: str) -> str | list[tuple[str, str, str]]:
+    """Name, default as JSON and type of each parameter, or why the module cannot be imported."""
+    config = _config_of(module)
+    if config is None or isinstance(config, str):
+        return config or []
+    described = []
+    for name, field in config.model_fields.items():
+        default = ""
+        if not field.is_required():
+            value = field.get_default(call_default_factory=True, validated_data={})
+            default = json.dumps(to_jsonable_python(value, fallback=str), ensure_ascii=False)
+        described.append((name, default, re.sub(r"\b(?:\w+\.)+", "", inspect.formatannotation(field.annotation))))
+    return described
 
 
 def _finding(config: type[BaseModel], details: ErrorDetails) -> tuple[list[str], str]:
@@ -118,10 +176,15 @@ def _finding(config: type[BaseModel], details: ErrorDetails) -> tuple[list[str],
 
 
 def main() -> None:
-    """Reads nodes, modules and parameters from standard input; writes an answer per line as JSON."""
+    """Reads nodes, modules and parameters from standard input; writes an answer per line as JSON.
+
+    With `--describe` the answers are what there is, not what is wrong.
+    """
+    describes = DESCRIBE in sys.argv[1:]
     answers, sys.stdout = sys.stdout, sys.stderr  # so that output of a module does not mix with the answers
     for _, module, parameters in json.load(sys.stdin):
-        answers.write(json.dumps(_answer(module, parameters)) + "\n")
+        answer = _description(module) if describes else _answer(module, parameters)
+        answers.write(json.dumps(answer) + "\n")
         answers.flush()
 
 

@@ -66,7 +66,7 @@ class RunFolder:
 
     def write_effective(self, launch: Launch) -> None:
         """Writes `launch.yaml`: the launch file after overlays, settings and defaults."""
-        _write(self.path / "launch.yaml", launch.file.model_dump(mode="json"))
+        write_yaml(self.path / "launch.yaml", launch.file.model_dump(mode="json"))
 
     def write_configs(
         self, launch: Launch, bus_folder: Path, truth_folder: Path, clock: str | None = None, host: str | None = None
@@ -98,11 +98,11 @@ class RunFolder:
             if node.remaps:
                 bus["remaps"] = dict(node.remaps)
             config = {"node": name, "bus": bus, "parameters": node.parameters, "run_folder": str(self.path)}
-            _write(self.config(name), config)
+            write_yaml(self.config(name), config)
 
     def write_run(self, facts: dict[str, Any]) -> None:
         """Writes `run.yaml`: facts of the run and, once it has ended, its outcome."""
-        _write(self.path / "run.yaml", facts)
+        write_yaml(self.path / "run.yaml", facts)
 
 
 def _point_latest(runs: Path, path: Path) -> None:
@@ -112,7 +112,8 @@ def _point_latest(runs: Path, path: Path) -> None:
     temporary.replace(runs / "latest")
 
 
-def _write(path: Path, content: Any) -> None:
+def write_yaml(path: Path, content: Any) -> None:
+    """Writes plain values into a file that only its owner may read; it is there whole, or not at all."""
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False
     yaml.representer.ignore_aliases = lambda _: True  # readers reject them

@@ -104,7 +104,8 @@ def leave_out(
             An InterpolativePHMM needs every theta: for it repetitions are left out.
         finished: called after each fold with the number of finished folds and of all folds.
 
-    Raises ValueError if there is only one group, or if a fold cannot be trained.
+    Raises ValueError if there is only one group, if without one all others have the same theta, or if a fold cannot be
+    trained.
     """
     if by == "theta" and isinstance(make(), InterpolativePHMM):
         by = "repetition"
@@ -114,6 +115,11 @@ def leave_out(
     results: list[LeftOut] = []
     for number, tested in enumerate(folds):
         rest = examples.of([one for one in range(len(examples)) if one not in tested])
+        if (rest.theta == rest.theta[0]).all():
+            raise ValueError(
+                f"without one {by} all others have the theta {rest.theta[0].tolist()}, so that nothing can be tested; "
+                "add movements with a third theta, or leave nothing out (--leave-out none)"
+            )
         model = make().fit(rest.sequences, rest.theta, rest.groups)
         results += [_tested(model, examples, one, rest) for one in tested]
         if finished is not None:

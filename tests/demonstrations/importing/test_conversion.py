@@ -46,7 +46,9 @@ def test_what_is_no_axes(axes):
         axes_matrix(axes)
 
 
-@pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("cm", 0.01), ("mm", 0.001)])
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("m", 1.0), ("cm", 0.01), ("mm", 0.001), ("MM", 0.001), ("Meters", 1.0), ("centimetres", 0.01)]
+)
 def test_units(unit, factor):
     take, _ = converted(raw(unit=unit), ImportOptions(), FILE)
     assert_allclose(take.positions, factor * raw().positions, rtol=1e-15, atol=0.0)

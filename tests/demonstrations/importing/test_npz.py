@@ -71,6 +71,7 @@ def test_what_the_file_marks_as_unusable_is_left_out_and_told(tmp_path):
         ({"points": ["wrist"]}, "positions have shape"),
         ({"positions": np.zeros((10, 3, 2))}, r"\(10, 3, 2\); 2 points need \(T, 2, 3\); transpose"),
         ({"rate_hz": None, "time": np.arange(9)}, "10 frames have times of shape"),
+        ({"rate_hz": 0.0}, "a frame rate above 0 expected"),
         ({"points": None}, "the array 'points' is missing; there are positions, rate_hz, unit"),
         ({"positions": np.array([None, None])}, "found pickled objects"),
     ],

@@ -16,6 +16,15 @@ from paramove.demonstrations.importing.checking import RawTake, about_leaps, che
 from paramove.documents import Floats, closest, nearest, read_document
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+UNIT_WORDS = {
+    "meter": "m",
+    "metre": "m",
+    "centimeter": "cm",
+    "centimetre": "cm",
+    "millimeter": "mm",
+    "millimetre": "mm",
+}
+"""How files write units, without a plural's s, in small letters."""
 FRAME = "laboratory"
 UNLABELLED = "*"
 """Begin of the names that C3D files have for markers that nobody has named, such as `*110`."""
@@ -82,7 +91,7 @@ def converted(raw: RawTake, options: ImportOptions, file: Path | str) -> tuple[T
 
     Raises DemonstrationError if the unit, the rate or a point is not known, or the take cannot be used (`checked`).
     """
-    unit = options.unit or raw.unit
+    unit = options.unit or _unit(raw.unit)
     if unit is None:
         raise DemonstrationError(f"{file} does not define its unit; give --unit {', '.join(METRES)}")
     if unit not in METRES:
@@ -104,6 +113,14 @@ def converted(raw: RawTake, options: ImportOptions, file: Path | str) -> tuple[T
     time: Floats = np.asarray(take.time)
     remarks += tuple(about_leaps(time, positions, names, file))
     return Take(recording_name(raw.name), time, positions, names, FRAME, labels), remarks
+
+
+def _unit(word: str | None) -> str | None:
+    """A file's unit as this program calls it; one that it does not know as it is."""
+    if word is None:
+        return None
+    small = word.strip().casefold()
+    return UNIT_WORDS.get(small.removesuffix("s"), small if small in METRES else word)
 
 
 def _assumed(axes: str, positions: Floats, file: Path | str) -> str:

@@ -34,7 +34,7 @@ ROW_NUMBERS = {"", "index", "unnamed: 0", "row", "rows"}
 LINE_LETTERS = 2**20
 """Maximum length of a line; a longer one is cut, and rejected for its number of cells."""
 CHUNK_BYTES = 2**20
-LOST = {"", "nan", "na", "null", "none", "-"}
+LOST = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-"}
 
 
 class _Columns(NamedTuple):

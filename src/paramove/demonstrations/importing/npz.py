@@ -50,6 +50,8 @@ def _one(path: Path, arrays: Arrays) -> RawTake:
         )
     check_length(len(positions), path)
     rate = next((float(arrays[key]) for key in ("rate_hz", "fps") if key in arrays), None)
+    if rate is not None and not 0.0 < rate < np.inf:
+        raise DemonstrationError(f"{path}: a frame rate above 0 expected, found {rate:g}")
     time = np.asarray(arrays["time"], dtype=np.float64) if "time" in arrays else None
     unit_s = None
     if time is None and rate is not None:
