@@ -79,8 +79,6 @@ def test_values_are_yaml_and_land_in_the_order_of_their_times(live, config):
         (request(value="fast"), "valid number"),
         (request(value="[1"), "speed"),
         (request(value="nan"), "speed"),
-        (request("fixed", "4"), "does not change while node runs"),
-        (request("sped"), "did you mean 'speed'?"),
     ],
 )
 def test_what_is_wrong_is_rejected_with_the_reason_and_changes_nothing(live, config, wrong, words):
@@ -89,6 +87,14 @@ def test_what_is_wrong_is_rejected_with_the_reason_and_changes_nothing(live, con
     assert config == Config()
     assert words in of(live, "speed").rejection
     assert of(live, "speed").request_id == "1"
+
+
+@pytest.mark.parametrize(("name", "words"), [("fixed", "there are: names, speed"), ("sped", "did you mean 'speed'?")])
+def test_what_does_not_change_while_the_node_runs_is_logged_with_what_does(live, config, caplog, name, words):
+    assert not live.receive(request(name, "4"), SECOND)
+    assert not live.land(SECOND)
+    assert config == Config()
+    assert words in caplog.text
 
 
 def test_a_time_that_is_over_is_rejected_as_late(live, config):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from bisect import insort
 from dataclasses import dataclass, field
 from operator import attrgetter
@@ -11,9 +12,11 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import to_jsonable_python
 
-from paramove.documents import DocumentError, findings, nearest, read_value
+from paramove.documents import DocumentError, findings, nearest, printable, read_value
 from paramove.msgs.node_status_pb2 import NodeParameter
 from paramove.msgs.parameters_pb2 import ParameterRequest
+
+_log = logging.getLogger(__name__)
 
 MOST_WAITING = 100
 
@@ -59,7 +62,7 @@ class LiveParameters:
         return list(self._parameters.values())
 
     def receive(self, request: ParameterRequest, now_ns: int) -> bool:
-        """Takes a request, or rejects it; returns whether it was for this node.
+        """Takes a request, or rejects it; returns whether it was for a parameter of this node.
 
         One that is to land at a time that is over is rejected, so that a recorded request that was not rejected has
         landed exactly at its time.
@@ -67,11 +70,10 @@ class LiveParameters:
         if request.node != self._node:
             return False
         parameter = self._parameters.get(request.name)
-        if parameter is None:
-            for one in self._parameters.values():  # whoever has sent it reads it at any of them
-                one.request_id = request.id
-                one.rejection = f"'{request.name}' does not change while {self._node} runs; {self._known(request.name)}"
-            return True
+        if parameter is None:  # whoever looks at the status before a request knows the names
+            name = printable(request.name)
+            _log.warning("'%s' does not change while the node runs; %s", name, nearest(name, self._parameters))
+            return False
         parameter.request_id, parameter.late = request.id, False
         at_ns = request.at.ToNanoseconds() if request.HasField("at") else now_ns
         try:
@@ -123,9 +125,6 @@ class LiveParameters:
         """The configuration with another value; raises ValidationError."""
         values = {key: getattr(self._config, key) for key in type(self._config).model_fields}
         return type(self._config).model_validate({**values, name: value})
-
-    def _known(self, name: str) -> str:
-        return nearest(name, self._parameters)
 
     def _describe(self) -> None:
         for name, parameter in self._parameters.items():

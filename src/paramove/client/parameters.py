@@ -83,7 +83,10 @@ def _answer(run: Run, request: ParameterRequest, timeout_s: float) -> NodeParame
     request.id = f"{run.name} {time.monotonic_ns()}"
     request.captured.FromNanoseconds(max(0, run.now_ns))
     if not run.publish(topics.PARAMETERS_SET, request, wait_s=timeout_s):
-        raise NoMessageError(f"nobody subscribes to {topics.PARAMETERS_SET.name}: {request.node} has ended")
+        raise NoMessageError(
+            f"nobody subscribes to {topics.PARAMETERS_SET.name} here: {request.node} has ended, or runs on another "
+            "host, where its parameters are changed"
+        )
     return next(_reports(run, request, timeout_s))
 
 
