@@ -129,36 +129,43 @@ def checked(
     positions = raw.positions.copy()
     positions[~np.isfinite(positions).all(axis=-1)] = np.nan
     if zeros_are_lost:
-        for point in range(positions.shape[1]):
-            positions[zeros(positions[:, point]), point] = np.nan
+        for path in positions.swapaxes(0, 1):
+            path[zeros(path)] = np.nan
     if repeats_are_lost:
-        for point, name in enumerate(raw.point_names):
-            for what, axes in COORDINATES.items():
-                marked = placeholders(positions[:, point], axes)
-                positions[marked, point] = np.nan
-                if marked.any():
-                    remarks.append(
-                        f"{file}: {what}{name} is at one position far from all others in frames "
-                        f"{frame_ranges(marked)}: lost there (--repeats-are-places: it was there)"
-                    )
-        stalled = stalls(positions)
-        if stalled.any():
-            remarks.append(
-                f"{file}: all points repeat their positions exactly in frames {frame_ranges(stalled)}, and jump "
-                "afterwards: did the capture stand still?"
-            )
-        repeated = frozen(positions)
-        positions[repeated] = np.nan
-        remarks += [
-            f"{file}: {name} repeats its position exactly while others move, in frames {frame_ranges(marked)}: lost "
-            "there (--repeats-are-places: it rested)"
-            for name, marked in zip(raw.point_names, repeated.T, strict=True)
-            if marked.any()
-        ]
+        remarks += _mark_repeats(positions, raw.point_names, file)
     take = replace(raw, time=time, time_unit_s=1.0, positions=positions)
     remarks += _about_bursts(time, file)
     with_all, about_holes = _with_missing_frames(take, file)
     return replace(with_all, remarks=(*remarks, *about_holes))
+
+
+def _mark_repeats(positions: Floats, names: Sequence[str], file: Path | str) -> list[str]:
+    """Sets positions (T, P, 3) that stand for none, or repeat the last one known, to NaN; remarks on them."""
+    remarks = []
+    for name, path in zip(names, positions.swapaxes(0, 1), strict=True):
+        for what, axes in COORDINATES.items():
+            marked = placeholders(path, axes)
+            path[marked] = np.nan
+            if marked.any():
+                remarks.append(
+                    f"{file}: {what}{name} is at one position far from all others in frames {frame_ranges(marked)}: "
+                    "lost there (--repeats-are-places: it was there)"
+                )
+    stalled = stalls(positions)
+    if stalled.any():
+        remarks.append(
+            f"{file}: all points repeat their positions exactly in frames {frame_ranges(stalled)}, and jump "
+            "afterwards: did the capture stand still?"
+        )
+    repeated = frozen(positions)
+    positions[repeated] = np.nan
+    for name, marked in zip(names, repeated.T, strict=True):
+        if marked.any():
+            remarks.append(
+                f"{file}: {name} repeats its position exactly while others move, in frames {frame_ranges(marked)}: "
+                "lost there (--repeats-are-places: it rested)"
+            )
+    return remarks
 
 
 # Time -------------------------------------------------------------------------------------------------------------
@@ -412,13 +419,12 @@ def stalls(positions: Floats) -> NDArray[np.bool_]:
     stalled: NDArray[np.bool_] = np.zeros(len(positions), dtype=np.bool_)
     same = np.zeros_like(stalled)
     same[1:] = (positions[1:] == positions[:-1]).all(axis=(1, 2))  # NaN equals nothing
-    for first, end in runs(same):
-        if end - first < FROZEN_FRAMES - 1 or end >= len(positions):
-            continue
-        for path in positions.swapaxes(0, 1):
-            valid = np.flatnonzero(np.isfinite(path[:, 0]))
-            if _is_frozen(path, valid, first, end, QUANTA * _smallest_step(path)):
-                stalled[first:end] = True
+    found = [(first, end) for first, end in runs(same) if end - first >= FROZEN_FRAMES - 1 and end < len(positions)]
+    for path in positions.swapaxes(0, 1) if found else ():
+        valid = np.flatnonzero(np.isfinite(path[:, 0]))
+        noise = QUANTA * _smallest_step(path)
+        for first, end in found:
+            stalled[first:end] |= _is_frozen(path, valid, first, end, noise)
     return stalled
 
 
