@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,9 @@ import pytest
 
 from paramove.bus import topics
 from paramove.recording import read
+from tests.hosts.conftest import free_ports
 from tests.supervision.conftest import until
+from tests.supervision.test_two_hosts import STAND_IN
 
 BIN = Path(sys.executable).parent
 PARAMOVE = BIN / "paramove"
@@ -40,6 +43,31 @@ def test_a_new_application_runs_the_same_every_time_and_is_recorded(folder):
     first, second = (list(until_the_arrival(recording)) for recording in recordings)
     assert {topic for topic, _, _ in first} == {"cart/state", "cart/command", "speech"}
     assert first == second
+
+
+def test_on_two_hosts_it_runs_as_on_one(folder, tmp_path, short_folder, monkeypatch):
+    there = tmp_path / "there" / "my_robot"
+    (folder / "launch" / "overlays" / "two_hosts.yaml").parent.mkdir(exist_ok=True)
+    (folder / "launch" / "overlays" / "two_hosts.yaml").write_text(
+        "hosts:\n"
+        f"  here: {{address: 127.0.0.1, port: {free_ports()}}}\n"
+        f"  there: {{ssh: other, address: 127.0.0.1, port: {free_ports()}, folder: {there}, command: {PARAMOVE}}}\n"
+        "nodes: {driver: {host: there}}\n"
+    )
+    shutil.copytree(folder, there)
+    (short_folder / "there").mkdir(mode=0o700)
+    elsewhere = {"XDG_RUNTIME_DIR": str(short_folder / "there"), "XDG_CONFIG_HOME": str(tmp_path / "config_there")}
+    (tmp_path / "environment.json").write_text(json.dumps(elsewhere))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config_here"))
+    monkeypatch.setenv("PARAMOVE_SSH", f"{sys.executable} {STAND_IN} {tmp_path / 'environment.json'}")
+    trusted = paramove(folder, "host", "trust", "other", "--folder", str(there), "--command", str(PARAMOVE))
+    assert trusted.returncode == 0, trusted.stderr
+    recordings = []
+    for name, words in (("one", ()), ("two", ("--with", "two_hosts"))):
+        run = paramove(folder, "launch", "my_robot", "--runs", name, *words)
+        assert run.returncode == 0, run.stdout + run.stderr
+        recordings.append(list(until_the_arrival(folder / name / "latest" / "recording.mcap")))
+    assert recordings[0] == recordings[1]
 
 
 def until_the_arrival(recording):

@@ -72,6 +72,24 @@ def test_an_application_is_found_from_an_empty_folder(installed, tmp_path, name)
     assert f"workspace {tmp_path}, then {installed / 'paramove' / 'workspace'}" in " ".join(answer.stdout.split())
 
 
+def test_an_application_of_ones_own_runs_and_its_recording_is_played(installed, tmp_path, short_folder):
+    def paramove(folder, *words):
+        command = [sys.executable, "-m", "paramove.cli.main", *words]
+        environment = os.environ | {"PYTHONPATH": str(installed), "XDG_RUNTIME_DIR": str(short_folder)}
+        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    paramove(tmp_path, "new", "my_robot")
+    folder = tmp_path / "my_robot"
+    assert "The cart is at" in paramove(folder, "launch", "my_robot")
+    recording = "runs/latest/recording.mcap"
+    assert "cart/state" in paramove(folder, "bag", "info", recording)
+    played = paramove(folder, "bag", "play", recording, "--topics", "cart/state", "--rate", "100", "--wait", "0")
+    assert played.startswith("played ")
+    assert played != "played 0 messages\n"
+
+
 def test_the_core_trains_recognises_and_synthesises_without_the_extras(core, tmp_path):
     for words in (
         "demos synthesize set --columns 2 --rows 2 --repetitions 2",
