@@ -190,6 +190,7 @@ def test_pub_publishes_once_with_a_subscriber(run: Run, speaking: Path) -> None:
         (("speech", "hello"), exit_codes.CONFIGURATION, "as a mapping"),
         (("speech", "{text: 3}"), exit_codes.CONFIGURATION, "paramove.msgs.Speech"),
         (("relocation/goal", "{to: {x: 1e300}}"), exit_codes.CONFIGURATION, "to.x is 1e+300"),
+        (("speech", "{text: " + "a" * 70_000 + "}"), exit_codes.CONFIGURATION, "the topic allows 65536"),
         (("speech", "{text: hello}", "--wait", "0.1"), exit_codes.FAILURE, "nobody subscribed"),
         (("operator/arm", "{armed: true, by_person: true}"), exit_codes.CONFIGURATION, "paramove arm enable"),
         (("operator/stop", "{}"), exit_codes.CONFIGURATION, "paramove arm estop"),

@@ -12,7 +12,7 @@ import typer
 from paramove.bus import TopicTakenError, default_folder
 from paramove.cli.bus_options import DomainOption, show
 from paramove.cli.output import JsonOption, ended, one_line
-from paramove.client import Run, play
+from paramove.client import NoMessageError, Run, play
 from paramove.documents import exit_codes
 from paramove.recording import contents
 
@@ -70,7 +70,7 @@ def play_file(
     trajectories) is played only where --topics names it. What nodes or persons alone publish never is: the clock,
     states of nodes, truth, stops and requests to arm.
 
-    Exit codes: 0 played; 66 no such recording; 75 a node publishes one of the topics; 78 it has no such topic, or that
+    Exit codes: 0 played; 1 the simulated time is not known; 66 no such recording; 75 a node publishes one of the topics; 78 it has no such topic, or that
     is not played.
     """
     names = [name for name in topics.split(",") if name]
@@ -83,6 +83,8 @@ def play_file(
                     break
     except KeyboardInterrupt:
         return
+    except NoMessageError as error:  # of the clock
+        raise ended(str(error), exit_codes.FAILURE) from error
     except TopicTakenError as error:
         message = f"{error}; a topic has one publisher: name others by --topics, or paramove node stop NAME"
         raise ended(message, exit_codes.TEMPORARY) from error

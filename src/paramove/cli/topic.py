@@ -16,7 +16,7 @@ from paramove.bus import Received, TopicTakenError, inspection, is_map, topics, 
 from paramove.cli import completions
 from paramove.cli.bus_options import DomainOption, bus_folder, show, topic_named, with_old_keys
 from paramove.cli.output import JsonOption, ended, one_line
-from paramove.client import connect, message_of
+from paramove.client import NoMessageError, connect, message_of
 from paramove.documents import exit_codes, nearest
 
 app = typer.Typer(name="topic", help="Look at topics, messages and rates on the bus.", no_args_is_help=True)
@@ -165,8 +165,8 @@ def pub(
 
     The time of the message is that of the run. Nobody arms an arm so: `paramove arm enable` asks a person.
 
-    Exit codes: 0 published; 1 nobody subscribes; 2 there is no such topic; 66 nothing runs; 75 a node publishes it;
-    78 that is no message of the topic, or the topic is for nodes or persons.
+    Exit codes: 0 published; 1 nobody subscribes, or the simulated time is not known; 2 there is no such topic; 66 nothing runs; 75 a node publishes it;
+    78 that is no message of the topic, or too large a one, or the topic is for nodes or persons.
     """
     topic = topic_named(name)
     subscribers = False
@@ -182,6 +182,10 @@ def pub(
         return
     except TopicTakenError as error:
         raise ended(f"{error}; a topic has one publisher: paramove node stop NAME", exit_codes.TEMPORARY) from error
+    except NoMessageError as error:  # of the clock
+        raise ended(str(error), exit_codes.FAILURE) from error
+    except ValueError as error:  # too large
+        raise ended(str(error), exit_codes.CONFIGURATION) from error
     if not subscribers:
         raise ended(f"{topic.name}: published, but nobody subscribed within {wait_s:g} s", exit_codes.FAILURE)
 
