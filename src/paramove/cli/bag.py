@@ -70,8 +70,8 @@ def play_file(
     trajectories) is played only where --topics names it. What nodes or persons alone publish never is: the clock,
     states of nodes, truth, stops and requests to arm.
 
-    Exit codes: 0 played; 1 the simulated time is not known; 66 no such recording; 75 a node publishes one of the topics; 78 it has no such topic, or that
-    is not played.
+    Exit codes: 0 played; 1 the simulated time is not known; 66 no such recording; 75 a node publishes one of the
+    topics; 78 it has no such topic, or that is not played.
     """
     names = [name for name in topics.split(",") if name]
     try:

@@ -165,8 +165,9 @@ def pub(
 
     The time of the message is that of the run. Nobody arms an arm so: `paramove arm enable` asks a person.
 
-    Exit codes: 0 published; 1 nobody subscribes, or the simulated time is not known; 2 there is no such topic; 66 nothing runs; 75 a node publishes it;
-    78 that is no message of the topic, or too large a one, or the topic is for nodes or persons.
+    Exit codes: 0 published; 1 nobody subscribes, or the simulated time is not known; 2 there is no such topic;
+    66 nothing runs; 75 a node publishes it; 78 that is no message of the topic, or too large a one, or the topic is for
+    nodes or persons.
     """
     topic = topic_named(name)
     subscribers = False
