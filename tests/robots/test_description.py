@@ -138,6 +138,11 @@ def test_a_robot_of_servos_has_a_bus_and_a_chain_and_hoap3_has_not() -> None:
         ("hand: [0.126, 0.0, 0.0]", "hand: [0.126, 0.0]", r"chain\.links\.hand\.2 is missing"),
         ("servo_id: 12, motor: xm430_w350", "servo_id: 12, motor: xm430_w355", "motor 'xm430_w355'"),
         ("  xm430_w350: {", "  xm430_w300: {", "motor 'xm430_w350'; known motors are xm430_w300"),
+        (
+            "operating_velocity_deg_s: 90.0",
+            "operating_velocity_deg_s: 1e-9",
+            r"operating_velocity_deg_s: input should be greater than or equal to 1",
+        ),
         ("baud_rate: 1000000", "baud_rate: 0", r"bus\.baud_rate: input should be greater than 0"),
     ],
 )
