@@ -33,6 +33,8 @@ def run(bus: Bus, config: Config) -> None:
                 if count % REPORT_EVERY == 0:
                     detail = f"{count} messages recorded"
             recording.tell(detail)
+        for received in bus.rest():  # of the nodes that have ended before
+            recording.keep(received)
 
 
 if __name__ == "__main__":

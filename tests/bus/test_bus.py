@@ -83,6 +83,18 @@ def test_what_no_loop_asks_for_is_bounded_and_counted(speaker: Bus, listener: Bu
     assert listener.dropped == {"gestures": 500}
 
 
+def test_the_rest_is_all_that_no_loop_has_taken_also_what_arrives_after_the_stop(speaker: Bus, listener: Bus) -> None:
+    speaker.publish(topics.GESTURES, Gesture(object="left by the loop"))
+    speaker.publish(topics.RULES, Rules(frame="taken"))
+    assert next(listener.events(topics.RULES)).message.frame == "taken"
+    listener.stop()
+    speaker.publish(topics.GESTURES, Gesture(object="after the stop"))
+    assert list(listener.events()) == []
+    rest = [one.message.object for one in listener.rest() if one.topic is topics.GESTURES]
+    assert rest == ["left by the loop", "after the stop"]
+    assert listener.rest() == []
+
+
 def test_ticks_come_without_messages(listener: Bus) -> None:
     ticks = list(itertools.islice(listener.events(topics.RULES, tick=True), 3))
     assert all(isinstance(tick, Tick) for tick in ticks)

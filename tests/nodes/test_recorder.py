@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -106,3 +107,17 @@ def test_a_log_without_room_ends_no_node(tmp_path: Path) -> None:
         process.terminate()
         assert process.wait(120) == 0
     assert len(list(read(tmp_path / "recording.mcap"))) == 1
+
+
+def test_what_was_published_before_the_request_to_end_is_recorded(tmp_path: Path) -> None:
+    """The process stands still while messages and the request arrive, as when a run ends with its last tick."""
+    with recording_in(tmp_path, tmp_path / "log") as (process, bus):
+        until((tmp_path / "recording.mcap.part").exists, "it records")
+        process.send_signal(signal.SIGSTOP)
+        for number in range(20):
+            bus.publish(topics.GESTURES, Gesture(object=f"object {number}"))
+        process.send_signal(signal.SIGTERM)
+        process.send_signal(signal.SIGCONT)
+        assert process.wait(60) == 0
+    recorded = [one.message.object for one in read(tmp_path / "recording.mcap")]
+    assert recorded == [f"object {number}" for number in range(20)]

@@ -186,6 +186,13 @@ class Bus:
             assert isinstance(event, Received)
             yield event
 
+    def rest(self) -> list[Received]:
+        """What has arrived and no loop has taken, oldest first: for a node that is about to end."""
+        self.exchange.drain_to_the_last(self._subscribed)
+        rest = self._backlog + self.exchange.take(self._subscribed)
+        self._backlog = []
+        return rest
+
     def connect(self, timeout_s: float = CONNECT_TIMEOUT_S, visitor: bool = False) -> None:
         """Waits until the node is connected with those that run already, so that neither misses a message of the other.
 
@@ -376,13 +383,12 @@ class Bus:
         return True
 
     def _without_requests(self, messages: list[Received], live: LiveParameters) -> list[Received]:
-        """What the node gets of these messages; changes of its parameters are made, and its status tells them."""
+        """What the node gets of these messages; changes of its parameters are made, and reported by its status."""
         requests = [received for received in messages if received.topic is topics.PARAMETERS_SET]
         is_answered = False
         for received in requests:
             is_answered |= live.receive(received.message, self.now_ns)
         if live.land(self.now_ns) or is_answered:
-            self._status.parameters = live.parameters
             self._status.publish(self.now_ns)
         return [received for received in messages if received.topic is not topics.PARAMETERS_SET]
 

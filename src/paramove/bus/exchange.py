@@ -7,7 +7,7 @@ import math
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import attrgetter
 from typing import Any
 
@@ -32,6 +32,10 @@ DRAIN_LIMIT = 1000
 """Messages taken from one topic at once, so that a flood on it does not block the process."""
 URGENT_LIMIT = 20
 """The same for an urgent topic, between any two other messages."""
+QUIET_S = 0.02
+"""Without a message for so long, no more are on the way from nodes that have ended."""
+LAST_S = 0.2
+"""Time for messages that are on the way when a node ends."""
 
 
 class Exchange:
@@ -228,6 +232,16 @@ class Exchange:
                 pending.append((subscriber.counter.epoch or 0, received))
                 if self.urgent_first and not received.topic.is_urgent and self._urgent_waits():
                     return
+
+    def drain_to_the_last(self, topics: Sequence[str]) -> None:
+        """Drains until nothing more arrives for `QUIET_S`, or `LAST_S` have passed; also once the bus is stopped."""
+        poller = zmq.Poller()
+        for name in topics:
+            poller.register(self.subscribers[name].socket, zmq.POLLIN)
+        end_s = time.monotonic() + LAST_S
+        self.drain(topics)
+        while poller.poll(math.ceil(1000 * QUIET_S)) and time.monotonic() < end_s:
+            self.drain(topics)
 
     def take_urgent(self) -> list[Received]:
         """What has arrived of the urgent topics: stops first, each topic in order of arrival.

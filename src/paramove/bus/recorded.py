@@ -110,6 +110,10 @@ class RecordedBus:
             iteration.clear()
         yield from iteration.values()
 
+    def rest(self) -> list[Received]:
+        """Nothing: a recording waits until its node takes the next message."""
+        return []
+
     def subscribe(self, topic: Topic) -> None:
         """Every topic of the recording is subscribed anyway."""
 
