@@ -1,4 +1,4 @@
-"""One node beside a running application, or alone; and what a launch file can be told."""
+"""One node beside a running application, or alone; and what can be set in a launch file."""
 
 import os
 import signal
@@ -26,7 +26,7 @@ class Config(NodeConfig):
 
 
 def run(bus: Bus, config: Config) -> None:
-    bus.ready("speaks")
+    bus.ready("announces")
     for _ in range(config.times):
         bus.publish(topics.SPEECH, Speech(text=config.text))
     if config.ends:
@@ -43,7 +43,7 @@ if __name__ == "__main__":
 @pytest.fixture
 def folder(user_workspace, short_folder, monkeypatch):
     """A workspace with a node, in a domain of its own."""
-    user_workspace.write("nodes/speaker.py", NODE)
+    user_workspace.write("nodes/announcer.py", NODE)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(short_folder))
     monkeypatch.delenv("PARAMOVE_DOMAIN", raising=False)
     return user_workspace.root
@@ -61,21 +61,21 @@ def ended(*words):
 
 
 def test_alone_it_is_an_application_of_one_node(folder):
-    code, output, errors = ended("run", "nodes.speaker", "--set", "times=0", "--set", "ends=true")
+    code, output, errors = ended("run", "nodes.announcer", "--set", "times=0", "--set", "ends=true")
     assert code == exit_codes.OK, errors
     assert "done: " in output
-    assert "speaker" in (folder / "runs" / "latest" / "launch.yaml").read_text()
+    assert "announcer" in (folder / "runs" / "latest" / "launch.yaml").read_text()
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("nodes.speakr",), "speaker"),
-        (("nodes.speaker",), "'times' is missing"),
-        (("nodes.speaker", "--set", "times=x"), "times: input should be a valid integer"),
-        (("nodes.speaker", "--set", "tmes=1"), "did you mean 'times'?"),
-        (("nodes.speaker", "--set", "times=1", "--remap", "speach=a"), "did you mean 'speech'?"),
-        (("nodes.speaker", "--set", "times=1", "--name", "No Name"), "No Name"),
+        (("nodes.anouncer",), "announcer"),
+        (("nodes.announcer",), "'times' is missing"),
+        (("nodes.announcer", "--set", "times=x"), "times: input should be a valid integer"),
+        (("nodes.announcer", "--set", "tmes=1"), "did you mean 'times'?"),
+        (("nodes.announcer", "--set", "times=1", "--remap", "speach=a"), "did you mean 'speech'?"),
+        (("nodes.announcer", "--set", "times=1", "--name", "No Name"), "No Name"),
     ],
 )
 @pytest.mark.parametrize("beside", [False, True])
@@ -91,18 +91,18 @@ def test_beside_others_it_joins_their_bus_with_its_topics_renamed_and_ends_by_ct
     settings = BusSettings(folder=short_folder / "paramove" / "default")
     with Bus("other", settings, (), (topics.SPEECH,)) as bus:
         bus.ready("is here")
-        code, _, errors = ended("run", "nodes.speaker", "--set", "times=1")
+        code, _, errors = ended("run", "nodes.announcer", "--set", "times=1")
         assert code == exit_codes.TEMPORARY
         assert f"pid {os.getpid()} (other)" in errors
         words = ("--set", "times=1", "--set", "text=there", "--name", "second", "--remap", "speech=rules/speech")
-        process = paramove("run", "nodes.speaker", *words)
+        process = paramove("run", "nodes.announcer", *words)
         bus.exchange.subscribe(topics.status("second"))
         states = []
 
         def is_ready() -> bool:
             bus.idle(0.05)
             states.extend(one.message.detail for one in bus.exchange.take(["status/second"]))
-            return "speaks" in states
+            return "announces" in states
 
         until(is_ready, "the node has joined")
         assert (settings.folder / "rules.speech").exists()
@@ -113,25 +113,25 @@ def test_beside_others_it_joins_their_bus_with_its_topics_renamed_and_ends_by_ct
 
 def test_show_args_lists_what_can_be_set(folder):
     (folder / "launch" / "talk.yaml").write_text(
-        "nodes:\n  speaker: {module: nodes.speaker, optional_topics: ['*'], parameters: {text: hi}}\n"
+        "nodes:\n  announcer: {module: nodes.announcer, optional_topics: ['*'], parameters: {text: hi}}\n"
     )
     code, output, errors = ended("launch", "talk", "--show-args")
     assert code == exit_codes.OK, errors
     assert [line.split() for line in output.splitlines()] == [
-        ["speaker.text", '"hi"', "str"],
-        ["speaker.times", "(needed)", "int"],
-        ["speaker.ends", "false", "bool"],
+        ["announcer.text", '"hi"', "str"],
+        ["announcer.times", "(needed)", "int"],
+        ["announcer.ends", "false", "bool"],
     ]
 
 
 def test_a_remap_of_the_command_line_is_checked_and_used(folder):
     (folder / "launch" / "talk.yaml").write_text(
-        "nodes:\n  speaker: {module: nodes.speaker, optional_topics: ['*'], parameters: {times: 0, ends: true},"
+        "nodes:\n  announcer: {module: nodes.announcer, optional_topics: ['*'], parameters: {times: 0, ends: true},"
         " ends_run: true}\n"
     )
-    code, _, errors = ended("launch", "talk", "--remap", "speaker:speech=gestures")
+    code, _, errors = ended("launch", "talk", "--remap", "announcer:speech=gestures")
     assert code == exit_codes.CONFIGURATION
     assert "speech cannot become gestures" in errors
-    code, _, errors = ended("launch", "talk", "--remap", "speaker:speech=their/speech")
+    code, _, errors = ended("launch", "talk", "--remap", "announcer:speech=their/speech")
     assert code == exit_codes.OK, errors
-    assert "their/speech" in (folder / "runs" / "latest" / "nodes" / "speaker.yaml").read_text()
+    assert "their/speech" in (folder / "runs" / "latest" / "nodes" / "announcer.yaml").read_text()

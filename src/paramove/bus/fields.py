@@ -93,7 +93,7 @@ def _changed_value(present: EnumDescriptor, former: EnumDescriptor) -> str:
     return ""
 
 
-def is_of_no_google(descriptor: Descriptor) -> bool:
+def is_not_of_google(descriptor: Descriptor) -> bool:
     """Whether a message type is another than Google's, which everybody knows."""
     return not str(descriptor.full_name).startswith("google.")
 
@@ -124,7 +124,7 @@ def changed_field(present: Descriptor, former: Descriptor) -> str:
     return ""
 
 
-def written_out(descriptor: Descriptor, only: Callable[[Descriptor], bool] = is_of_no_google) -> str:
+def written_out(descriptor: Descriptor, only: Callable[[Descriptor], bool] = is_not_of_google) -> str:
     """A message type, and those in it that pass `only`, as in a `.proto` file."""
     seen = {descriptor.full_name}
     blocks = []

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import logging
 from bisect import insort
-from dataclasses import dataclass, field
 from operator import attrgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import to_jsonable_python
@@ -19,16 +18,16 @@ from paramove.msgs.parameters_pb2 import ParameterRequest
 _log = logging.getLogger(__name__)
 
 MOST_WAITING = 100
+"""Changes that wait for their time."""
 
 
-@dataclass(frozen=True)
-class _Change:
+class _Change(NamedTuple):
     """What becomes of a parameter at a time of the run, ns."""
 
     at_ns: int
     request_id: str
     name: str
-    value: Any = field(compare=False)
+    value: Any
 
 
 class LiveParameters:
@@ -58,7 +57,7 @@ class LiveParameters:
 
     @property
     def parameters(self) -> list[NodeParameter]:
-        """Values, and what has become of requests, for the node's status."""
+        """Values, and what has become of requests, for the node's status; kept up to date."""
         return list(self._parameters.values())
 
     def receive(self, request: ParameterRequest, now_ns: int) -> bool:

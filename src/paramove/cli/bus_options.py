@@ -11,7 +11,7 @@ import typer
 
 from paramove.bus import Topic, running_folder, topics
 from paramove.cli import completions
-from paramove.cli.output import ended
+from paramove.cli.output import aligned, ended
 from paramove.documents import InputError, exit_codes
 
 DomainOption = Annotated[
@@ -59,9 +59,8 @@ def show(rows: Sequence[dict[str, Any]], as_json: bool) -> None:
     if not rows:
         return
     texts = [[str(key) for key in rows[0]], *([_text(value) for value in row.values()] for row in rows)]
-    widths = [max(len(row[column]) for row in texts) for column in range(len(texts[0]))]
-    for row in texts:
-        typer.echo("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+    for line in aligned(texts):
+        typer.echo(line)
 
 
 def _text(value: object) -> str:

@@ -16,6 +16,7 @@ from pathlib import Path
 import typer
 from rich.console import Console
 
+from paramove.cli.output import aligned
 from paramove.cli.set_up_view import FOLDER_VARIABLE, open_where_displayed
 from paramove.dashboard import NAME, link_in, process_in
 from paramove.documents import DocumentError, InputError, exit_codes, printable
@@ -45,6 +46,9 @@ from paramove.workspace import Workspace
 
 PAGE, OWN_PAGE = "view", "page"
 """Overlays with the page for any application, and with what an application changes of it."""
+
+LONGEST_SHOWN = 60
+"""Characters of a value that `--show-args` shows, so that the table fits a terminal."""
 
 
 def run(
@@ -216,9 +220,11 @@ def _check_robots(launch: Launch) -> None:
 def _arguments(launch: Launch, workspace: Workspace, environment: Environment) -> list[str]:
     """The parameters that `--set` can change: name, value, type."""
     found = arguments(launch, read_interfaces(launch, workspace), workspace)
-    rows = [(one.name, printable(one.value) or "(needed)", one.kind) for one in found]
-    widths = [max(map(len, texts)) for texts in zip(*rows, strict=True)]
-    return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return aligned([(one.name, _cut(printable(one.value)) or "(needed)", one.kind) for one in found])
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 1]}…"
 
 
 def _checked(launch: Launch, workspace: Workspace, environment: Environment) -> list[str]:

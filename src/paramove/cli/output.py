@@ -52,6 +52,12 @@ def list_of(files: Iterable[Path], row: Callable[[Path], dict[str, Any]], as_jso
         raise ended("\n".join(wrong), exit_codes.CONFIGURATION)
 
 
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of texts as lines in which the columns begin at the same place."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
 def table_of(rows: Sequence[dict[str, Any]]) -> None:
     """Prints rows that have the same keys; numbers to the right."""
     if not rows:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from paramove.bus import TopicTakenError, nodes_in
+from paramove.bus import TopicTakenError, inspection, nodes_in
 from paramove.cli import completions
 from paramove.cli.bus_options import DomainOption, bus_folder, show
 from paramove.cli.output import JsonOption, ended, one_line
-from paramove.client import NoMessageError, Run, parameters_of, set_parameter
-from paramove.documents import exit_codes, nearest
+from paramove.client import NoMessageError, Run, parameter_of, parameters_of, set_parameter
+from paramove.documents import InputError, exit_codes, nearest
 from paramove.msgs.node_status_pb2 import NodeParameter
 
 app = typer.Typer(name="param", help="Look at and change parameters of nodes that run.", no_args_is_help=True)
@@ -36,10 +38,13 @@ def list_parameters(
     info`.
     """
     folder = bus_folder(domain)
-    rows: list[dict[str, Any]] = []
-    with Run(folder, "paramove param") as run:
-        for name in [node] if node else nodes_in(folder):
-            rows += [_row(name, parameter) for parameter in _parameters(run, folder, name, wait_s).values()]
+    if node:
+        with _connected(folder, node) as run:
+            rows = [_row(node, parameter) for parameter in parameters_of(run, node, wait_s).values()]
+    else:
+        statuses = inspection.statuses(folder, wait_s)
+        answered = {name: status for name, status in statuses.items() if status is not None}
+        rows = [_row(name, parameter) for name, status in answered.items() for parameter in status.parameters]
     if not rows and not as_json:
         typer.echo("no parameter changes while its node runs")
     show(rows, as_json)
@@ -49,12 +54,11 @@ def list_parameters(
 def get(node: NodeArgument, name: NameArgument, domain: DomainOption = None, wait_s: WaitOption = 5.0) -> None:
     """Print the value of one of them, as JSON."""
     folder = bus_folder(domain)
-    with Run(folder, "paramove param") as run:
-        known = _parameters(run, folder, node, wait_s)
-    if name not in known:
-        what = nearest(name, known) if known else "none does: CHANGEABLE in its Config names them"
-        raise ended(f"'{name}' is no parameter that changes while {node} runs; {what}", exit_codes.USAGE)
-    typer.echo(known[name].value)
+    try:
+        with _connected(folder, node) as run:
+            typer.echo(parameter_of(run, node, name, wait_s).value)
+    except InputError as error:
+        raise ended(str(error), exit_codes.USAGE) from error
 
 
 @app.command("set")
@@ -78,22 +82,21 @@ def set_value(
     """
     folder = bus_folder(domain)
     try:
-        with one_line(), Run(folder, "paramove param") as run:
+        with one_line(), _connected(folder, node) as run:
             done = set_parameter(run, node, name, value, at_s, wait_s)
-    except NoMessageError as error:
-        raise ended(str(error), exit_codes.FAILURE) from error
     except TopicTakenError as error:
         raise ended(str(error), exit_codes.TEMPORARY) from error
     typer.echo(f"{node}.{name} is {done.value}" if at_s is None else f"{node}.{name} changes at {at_s:g} s")
 
 
-def _parameters(run: Run, folder: Path, node: str, wait_s: float) -> dict[str, NodeParameter]:
-    """Of a node; ends the command if it is not there."""
+@contextlib.contextmanager
+def _connected(folder: Path, node: str) -> Iterator[Run]:
+    """A connection; ends the command with the nearest node if the node does not answer."""
     try:
-        return parameters_of(run, node, wait_s)
-    except (NoMessageError, ValueError) as error:
-        known = nearest(node, nodes_in(folder))
-        raise ended(f"{error}; {known}", exit_codes.FAILURE) from error
+        with Run(folder, "paramove param") as run:
+            yield run
+    except NoMessageError as error:
+        raise ended(f"{error}; {nearest(node, nodes_in(folder))}", exit_codes.FAILURE) from error
 
 
 def _row(node: str, parameter: NodeParameter) -> dict[str, Any]:

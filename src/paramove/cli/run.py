@@ -38,15 +38,17 @@ def run(
     from paramove.bus import default_folder
     from paramove.cli.one_run import run_loaded
     from paramove.cli.output import one_line
-    from paramove.supervision import join, node_alone
+    from paramove.supervision import Launch, join, node_alone
     from paramove.workspace import Workspace
+
+    def loaded(_: Workspace) -> Launch:
+        return node_alone(module, name, settings or [], remaps or [])
 
     folder = default_folder(domain)
     if not folder.is_dir():
         if domain is not None:
             os.environ["PARAMOVE_DOMAIN"] = domain
-        code = run_loaded(lambda workspace: node_alone(workspace, module, name, settings or [], remaps or []))
-        raise typer.Exit(code)
+        raise typer.Exit(run_loaded(loaded))
     workspace = Workspace.here()
     with one_line():
-        join(node_alone(workspace, module, name, settings or [], remaps or []), workspace, folder)
+        join(loaded(workspace), workspace, folder)

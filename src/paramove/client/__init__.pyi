@@ -1,5 +1,6 @@
 from .content import message_of as message_of
 from .parameters import RejectedParameterError as RejectedParameterError
+from .parameters import parameter_of as parameter_of
 from .parameters import parameters_of as parameters_of
 from .parameters import set_parameter as set_parameter
 from .playing import is_played as is_played

@@ -24,10 +24,19 @@ class RejectedParameterError(InputError):
 def parameters_of(run: Run, node: str, timeout_s: float = 5.0) -> dict[str, NodeParameter]:
     """Parameters of a node that may change while it runs, by their names.
 
-    Raises NoMessageError if the node does not report in time.
+    Raises NoMessageError if the node does not report in time, InputError for what is no name of a node.
     """
-    status: NodeStatus = run.latest(topics.status(node), timeout_s)
+    status: NodeStatus = run.latest(f"status/{node}", timeout_s)
     return {parameter.name: parameter for parameter in status.parameters}
+
+
+def parameter_of(run: Run, node: str, name: str, timeout_s: float = 5.0) -> NodeParameter:
+    """One of them; raises as `parameters_of`, and InputError that names the others if the node has no such one."""
+    known = parameters_of(run, node, timeout_s)
+    if name not in known:
+        what = nearest(name, known) if known else "it declares none: CHANGEABLE in its Config"
+        raise InputError(f"'{name}' is no parameter that changes while {node} runs; {what}")
+    return known[name]
 
 
 def set_parameter(
@@ -52,10 +61,7 @@ def set_parameter(
         TopicTakenError: Another program is changing parameters just now.
         InputError: The node has no such parameter that changes while it runs.
     """
-    known = parameters_of(run, node, timeout_s)
-    if name not in known:
-        what = nearest(name, known) if known else "it declares none: CHANGEABLE in its Config"
-        raise InputError(f"'{name}' is no parameter that changes while {node} runs; {what}")
+    parameter_of(run, node, name, timeout_s)
     text = value if isinstance(value, str) else json.dumps(value)
     request = ParameterRequest(node=node, name=name, value=text, source=run.name)
     if at_s is not None:

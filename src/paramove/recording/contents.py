@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from paramove.bus import Topic, topics
+from paramove.bus import Topic
 from paramove.documents import InputError
 from paramove.recording.damage import MAGIC
 from paramove.recording.reader import read_any
-from paramove.recording.recorded_types import change_of, recorded_row
+from paramove.recording.recorded_types import change_of, known_row, recorded_row
 
 
 @dataclass
@@ -43,22 +42,14 @@ class RecordedTopic:
     @property
     def row(self) -> Topic:
         """Of the topic table, if it has the topic with this type; otherwise one of this name and type."""
-        known = self._known
+        known = known_row(self.name)
         return known if known is not None and known.type is self.type else recorded_row(self.name, self.type)
 
     @property
     def change(self) -> str:
         """What the topic table has another now, so that these messages are none of the topic's; "" if nothing."""
-        known = self._known
-        if known is None or known.type is self.type:
-            return ""
-        return change_of(known, self.type)
-
-    @property
-    def _known(self) -> Topic | None:
-        with contextlib.suppress(KeyError, ValueError):
-            return topics.by_name(self.name)
-        return None
+        known = known_row(self.name)
+        return "" if known is None else change_of(known, self.type)
 
     @property
     def rate_hz(self) -> float:

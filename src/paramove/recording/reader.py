@@ -15,7 +15,7 @@ from mcap.stream_reader import StreamReader
 from paramove.bus import topics
 from paramove.documents import InputError
 from paramove.recording.chunks import RECORD_BYTES, WRONG, allowance, records, whole
-from paramove.recording.recorded_types import row_of
+from paramove.recording.recorded_types import known_row, row_of
 
 MESSAGE_BYTES = 2**24
 """Of one message: as much as the largest topic allows."""
@@ -94,9 +94,7 @@ def _read(path: Path, only: Collection[str], raising: type[InputError], must_be_
 def _row(name: str, schema: Schema | None) -> topics.Topic | None:
     """The topic's row of the table, or one by its schema in the recording; None if that cannot be read."""
     if schema is None or name == topics.TRUTH_VIEW.name:  # the view is stored as another type
-        with contextlib.suppress(KeyError, ValueError):
-            return topics.by_name(name)
-        return None
+        return known_row(name)
     with contextlib.suppress(InputError):
         return row_of(name, schema)
     return None

@@ -23,11 +23,19 @@ def row_of(name: str, schema: Schema) -> Topic:
 
     Raises InputError for a topic that no table here knows and whose schema cannot be used.
     """
+    row = known_row(name)
+    if row is None or row.type_name != schema.name:
+        return recorded_row(name, type_of(schema))
+    if is_own(row.type.DESCRIPTOR) and change_of(row, type_of(schema)):
+        return recorded_row(name, type_of(schema))
+    return row
+
+
+def known_row(name: str) -> Topic | None:
+    """The topic's row of the table; None for a name that no table here has."""
     with contextlib.suppress(KeyError, ValueError):
-        row = topics.by_name(name)
-        if row.type_name == schema.name and not (is_own(row.type.DESCRIPTOR) and change_of(row, type_of(schema))):
-            return row
-    return recorded_row(name, type_of(schema))
+        return topics.by_name(name)
+    return None
 
 
 def recorded_row(name: str, kind: type[Any]) -> Topic:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from paramove.bus import CLOCK, inspection
 from paramove.supervision.application import check
 from paramove.supervision.environment import node_environment
 from paramove.supervision.launch_file import Launch
-from paramove.supervision.run_folder import write_yaml
+from paramove.supervision.run_folder import write_node_file
 from paramove.workspace import Workspace
 
 _FOLDER = "joined"
@@ -34,12 +34,10 @@ def join(launch: Launch, workspace: Workspace, folder: Path) -> NoReturn:
     check(launch, workspace)
     ((name, node),) = launch.file.nodes.items()
     is_simulated = inspection.publisher_of(folder, CLOCK).alive
-    bus: dict[str, Any] = {"folder": str(folder), "clock": "simulated" if is_simulated else "monotonic"}
-    if node.remaps:
-        bus["remaps"] = dict(node.remaps)
+    bus = {"folder": str(folder), "clock": "simulated" if is_simulated else "monotonic"}
     file = folder / _FOLDER / f"{name}.yaml"
     file.parent.mkdir(mode=0o700, exist_ok=True)
-    write_yaml(file, {"node": name, "bus": bus, "parameters": node.parameters, "run_folder": str(Path.cwd())})
+    write_node_file(file, name, node, bus, Path.cwd())
     environment = node_environment(os.environ, workspace)
     os.chdir(workspace.root)
     os.execve(sys.executable, [sys.executable, "-P", "-m", node.module, "--config", str(file)], environment)

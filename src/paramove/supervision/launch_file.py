@@ -85,26 +85,16 @@ def load(
     """
     path = _typed(workspace, (_FOLDER,), name, "launch file")
     document, chosen = _with_overlays(workspace, path.stem, _read(path), overlays, robot)
-    given = [topics.present_names(setting) for setting in settings]
-    document, findings = _with_values(document, given, seed, headless, overlays is not None, robot)
-    document, wrong_remaps = _with_remaps(document, [topics.present_names(remap) for remap in remaps])
-    findings += wrong_remaps
-    try:
-        file = validated(document)
-    except DocumentError as error:
-        findings.append(error)
-    findings += _wrong_references(document)
-    raise_any(findings)
+    document, findings = _with_values(document, settings, seed, headless, overlays is not None, robot)
+    document, wrong_remaps = _with_remaps(document, remaps)
+    file = _checked(document, findings + wrong_remaps)
     return Launch(Path(name).stem, tuple(chosen), file, document, seed, headless)
 
 
-def node_alone(
-    workspace: Workspace, module: str, name: str = "", settings: Sequence[str] = (), remaps: Sequence[str] = ()
-) -> Launch:
+def node_alone(module: str, name: str = "", settings: Sequence[str] = (), remaps: Sequence[str] = ()) -> Launch:
     """A launch file of one node, whose end is the end of the run and which may miss the publishers of its topics.
 
     Args:
-        workspace: Where the module is found.
         module: Such as nodes.camera.
         name: Of the node; default: the last part of the module.
         settings: Each `parameter=value`; the value is YAML.
@@ -115,16 +105,19 @@ def node_alone(
     name = name or module.rpartition(".")[2]
     node = {"module": module, "optional_topics": ["*"], "ends_run": True}
     document = Document({"nodes": {name: node}}, {(): Position(module)})
-    given = [topics.present_names(f"{name}.{setting}") for setting in settings]
-    document, findings = _with_values(document, given, None, False, False, None)
-    document, wrong_remaps = _with_remaps(document, [topics.present_names(f"{name}:{remap}") for remap in remaps])
-    findings += wrong_remaps
+    document, findings = _with_values(document, [f"{name}.{setting}" for setting in settings])
+    document, wrong_remaps = _with_remaps(document, [f"{name}:{remap}" for remap in remaps])
+    return Launch(name, (), _checked(document, findings + wrong_remaps), document)
+
+
+def _checked(document: Document, findings: list[DocumentError]) -> LaunchFile:
+    """The document as a launch file; raises DocumentError with the findings so far and its own."""
     try:
         file = validated(document)
     except DocumentError as error:
-        findings.append(error)
-    raise_any(findings)
-    return Launch(name, (), file, document)
+        findings = [*findings, error]
+    raise_any([*findings, *_wrong_references(document)])
+    return file
 
 
 def _with_overlays(
@@ -218,10 +211,10 @@ def _overlay(
 def _with_values(
     document: Document,
     settings: Sequence[str],
-    seed: int | None,
-    headless: bool,
-    named: bool,
-    robot: str | None,
+    seed: int | None = None,
+    headless: bool = False,
+    named: bool = False,
+    robot: str | None = None,
 ) -> tuple[Document, list[DocumentError]]:
     """The document with the values that `--headless`, `--robot`, `--set` and `--seed` give, and the errors in these.
 
@@ -244,7 +237,7 @@ def _with_values(
         if not robots:
             findings.append(DocumentError(where, "no node of this launch file names a robot, so none can be replaced"))
         values += [(f"{node}.robot", robot, where) for node in robots]
-    for setting in settings:
+    for setting in map(topics.present_names, settings):
         where = Position(f"--set {setting}")
         target, equals, text = setting.partition("=")
         if not equals or not all(target.strip().split(".")) or "." not in target:
@@ -282,7 +275,7 @@ def _with_remaps(document: Document, remaps: Sequence[str]) -> tuple[Document, l
     """The document with the remaps of the command line, each `node:topic=topic on the bus`, and the errors in these."""
     findings = []
     nodes = _mapping_at(document, "nodes")
-    for remap in remaps:
+    for remap in map(topics.present_names, remaps):
         where = Position(f"--remap {remap}")
         node, colon, names = remap.partition(":")
         topic, equals, target = names.partition("=")

@@ -13,6 +13,7 @@ from ruamel.yaml import YAML
 
 from paramove.documents import checked_name, replacing
 from paramove.supervision.launch_file import Launch
+from paramove.supervision.launch_schema import NodeSettings
 
 
 class RunFolder:
@@ -66,7 +67,7 @@ class RunFolder:
 
     def write_effective(self, launch: Launch) -> None:
         """Writes `launch.yaml`: the launch file after overlays, settings and defaults."""
-        write_yaml(self.path / "launch.yaml", launch.file.model_dump(mode="json"))
+        _write(self.path / "launch.yaml", launch.file.model_dump(mode="json"))
 
     def write_configs(
         self, launch: Launch, bus_folder: Path, truth_folder: Path, clock: str | None = None, host: str | None = None
@@ -95,14 +96,11 @@ class RunFolder:
                 bus["members"] = [other for other, its in launch.file.nodes.items() if its.lockstep and other != clock]
             if node.truth:
                 bus["truth_folder"] = str(truth_folder)
-            if node.remaps:
-                bus["remaps"] = dict(node.remaps)
-            config = {"node": name, "bus": bus, "parameters": node.parameters, "run_folder": str(self.path)}
-            write_yaml(self.config(name), config)
+            write_node_file(self.config(name), name, node, bus, self.path)
 
     def write_run(self, facts: dict[str, Any]) -> None:
         """Writes `run.yaml`: facts of the run and, once it has ended, its outcome."""
-        write_yaml(self.path / "run.yaml", facts)
+        _write(self.path / "run.yaml", facts)
 
 
 def _point_latest(runs: Path, path: Path) -> None:
@@ -112,8 +110,22 @@ def _point_latest(runs: Path, path: Path) -> None:
     temporary.replace(runs / "latest")
 
 
-def write_yaml(path: Path, content: Any) -> None:
-    """Writes plain values into a file that only its owner may read; it is there whole, or not at all."""
+def write_node_file(path: Path, name: str, node: NodeSettings, bus: dict[str, Any], run_folder: Path) -> None:
+    """Writes what a node gets as `--config`; see `paramove.bus.node`.
+
+    Args:
+        path: Of the file.
+        name: Of the node.
+        node: Its settings in the launch file.
+        bus: Its view of the bus, without its remaps.
+        run_folder: Where it may write files.
+    """
+    if node.remaps:
+        bus = bus | {"remaps": dict(node.remaps)}
+    _write(path, {"node": name, "bus": bus, "parameters": node.parameters, "run_folder": str(run_folder)})
+
+
+def _write(path: Path, content: Any) -> None:
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False
     yaml.representer.ignore_aliases = lambda _: True  # readers reject them
