@@ -2,7 +2,7 @@
 
 When its process is started again, or the disk was full, it goes on in `recording.2.mcap`, ….
 
-Subscribes  every topic that the topic table marks as recorded
+Subscribes  every topic that the topic table marks as recorded, in all namespaces or in its own
 """
 
 from paramove.bus import Bus, NodeConfig, Received, main, topics
@@ -26,7 +26,7 @@ def run(bus: Bus, config: Config) -> None:
     with Recorder(bus, bus.run_folder / config.file, "paramove recorder") as recording:
         count, detail = 0, f"recording to {recording.part_name}"
         recording.tell(detail)
-        for event in bus.events(*SUBSCRIBES, tick=True):
+        for event in bus.events(tick=True):
             if isinstance(event, Received):
                 recording.keep(event)
                 count += 1
@@ -38,4 +38,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, SUBSCRIBES, PUBLISHES, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config, every_namespace=True)

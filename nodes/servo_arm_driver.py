@@ -13,7 +13,7 @@ Publishes   arm/joint_states        foxglove.JointStates   15 Hz   rad
 
 from paramove.bus import TICK_PERIOD_NS, Bus, NodeConfig, Tick, main, topics
 from paramove.robots import RobotFolder, ThisLaunch
-from paramove.robots.dynamixel import DrivenArm, ServoArmSetup, prefer_the_loop
+from paramove.robots.dynamixel import DrivenArm, ServoArmSetup, pacing_socket, prefer_the_loop
 from paramove.robots.streaming import command_handlers
 
 SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.HOSTS_LINK)
@@ -30,8 +30,8 @@ class Config(NodeConfig, ServoArmSetup):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the arm then comes to rest."""
     launch = ThisLaunch.of(bus.settings)
-    paced_in = bus.settings.folder if bus.settings.lockstep else None
-    with config.driven_arm(bus.run_folder, launch, paced_in, checks_in_slices=paced_in is None) as arm:
+    paced_by = pacing_socket(bus.settings.folder, bus.settings.namespace) if bus.settings.lockstep else None
+    with config.driven_arm(bus.run_folder, launch, paced_by, checks_in_slices=paced_by is None) as arm:
         prefer_the_loop()
         bus.when_readable(arm.readable, lambda: publish_all(bus, arm))
         bus.when_idle(arm.check_on)

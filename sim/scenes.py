@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from paramove.motion import check_model
 from paramove.robots import RobotDescription
-from paramove.robots.dynamixel import PACING_SOCKET
+from paramove.robots.dynamixel import pacing_socket
 from sim import looks, tool_box
 from sim.camera import ImageSource, RobotCamera, ViewForPeople
 from sim.drawn_person import DrawnPerson
@@ -21,7 +21,7 @@ from sim.place_instructor import OBJECT, PlaceInstructor
 from sim.places import START
 from sim.pointing_world import PointingWorld
 from sim.servo_arm import ServoArm
-from sim.servo_arm_world import ServoArmWorld
+from sim.servo_arm_world import ServoArmWorld, ServoArmWorlds
 from sim.simulation import Simulated, SimulatedRobot, Simulation
 from sim.tracked_person import TrackedPerson, world_from_table
 from sim.world import World
@@ -44,11 +44,30 @@ def build(
     """
     if options.scene == "pointing":
         return PointingWorld(options.seed, options.targets, options.views, options.markers)
-    robot = RobotDescription.load(options.robot)
-    check_model(robot)
+    if options.robots:
+        return ServoArmWorlds(
+            {
+                namespace: _arm_alone(folder, options, run_folder / namespace, pacing_socket(bus_folder, namespace))
+                for namespace, folder in options.robots.items()
+            }
+        )
     if options.scene == "servo_arm":
-        return ServoArmWorld(robot, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed)
+        return _arm_alone(options.robot, options, run_folder, pacing_socket(bus_folder))
     return at_the_tool_box(options, run_folder, bus_folder, firmware_log, lockstep)
+
+
+def _arm_alone(folder: Path, options: Config, files: Path, pacing: Path) -> ServoArmWorld:
+    """An arm in the scene next to its model.
+
+    Args:
+        folder: Of the robot's description.
+        options: With the seed, and the name of the port.
+        files: Folder that the name of the port starts from.
+        pacing: Control socket, by which the arm's driver paces the world.
+    """
+    robot = RobotDescription.load(folder)
+    check_model(robot)
+    return ServoArmWorld(robot, files / options.port, pacing, options.seed)
 
 
 def at_the_tool_box(
@@ -66,7 +85,7 @@ def at_the_tool_box(
     if description.chain is None:
         robot = Hoap3(description, firmware_log)
     else:
-        robot = ServoArm(description, run_folder / options.port, bus_folder / PACING_SOCKET, options.seed, lockstep)
+        robot = ServoArm(description, run_folder / options.port, pacing_socket(bus_folder), options.seed, lockstep)
     tracked = None if options.scene == "rule_learning" else TrackedPerson(options.seed)
     furnishings = [] if tracked is None else [tracked.furnish]
     if "covered_opening" in options.mishaps:

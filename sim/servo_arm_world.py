@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -62,3 +62,51 @@ class ServoArmWorld:
     def close(self) -> None:
         """Removes the port."""
         self._arm.__exit__(None, None, None)
+
+
+class ServoArmWorlds:
+    """Arms in scenes of their own, each in the namespace of its driver.
+
+    Args:
+        worlds: By namespace.
+    """
+
+    finished = False
+
+    def __init__(self, worlds: Mapping[str, ServoArmWorld]) -> None:
+        self._worlds = worlds
+
+    @property
+    def now_ns(self) -> int:
+        """Simulated time since the start, which is the same in all of them between two ticks."""
+        return min(world.now_ns for world in self._worlds.values())
+
+    def write_measures(self, folder: Path) -> None:
+        """Nobody measures anything."""
+
+    def layout(self) -> TruthLayout | None:
+        """There is none."""
+        return None
+
+    def handle(self, received: Received) -> None:
+        """Nothing on the bus moves them."""
+
+    def run_to_tick(self, tick: int) -> None:
+        """Lets the worlds run where no driver did."""
+        for world in self._worlds.values():
+            world.run_to_tick(tick)
+
+    def messages(self) -> Iterator[tuple[Topic, Any]]:
+        """The truth in each namespace."""
+        for namespace, world in self._worlds.items():
+            for topic, message in world.messages():
+                yield topics.topic_in(namespace, topic), message
+
+    def detail(self, wall_s: float) -> str:
+        """That of each arm."""
+        return "; ".join(world.detail(wall_s) for world in self._worlds.values())
+
+    def close(self) -> None:
+        """Removes the ports."""
+        for world in self._worlds.values():
+            world.close()

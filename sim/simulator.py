@@ -61,6 +61,7 @@ OF_SCENES: Mapping[frozenset[str], frozenset[str]] = {
     frozenset({"targets", "views", "markers"}): frozenset({"pointing"}),
     frozenset({"robot"}): frozenset(get_args(Scene)) - {"pointing"},
     frozenset({"camera", "video", "measures"}): frozenset(get_args(Scene)) - {"pointing", "servo_arm"},
+    frozenset({"robots"}): frozenset({"servo_arm"}),
     frozenset({"camera_socket"}): frozenset({"rule_learning"}),
     frozenset({"mishaps"}): frozenset({"rule_learning", "rule_learning_whole_arm"}),
     frozenset({"port"}): frozenset(get_args(Scene)) - {"pointing"},
@@ -80,6 +81,7 @@ class Config(NodeConfig):
             `servo_arm`: emulated servos that move an arm in the scene next to its model; only in lockstep.
         seed: Of everything random in the world.
         robot: Folder of the robot's description.
+        robots: Of `servo_arm`, instead of one robot: namespace -> folder of the description of the arm in it.
         camera: Whether cameras' images are rendered; without, no graphics library is needed.
         video: Whether a view for people is rendered too.
         measures: Of the tool box and of the nominal camera; None: those for the robot's objects.
@@ -88,7 +90,7 @@ class Config(NodeConfig):
         targets: Of `pointing`: how often the person points.
         views: Of `pointing`: which cameras look, from 1.
         markers: Of `pointing`: points of the arm at which the person wears coloured balls.
-        port: Of a servo arm: link to the serial port, relative to the run's folder.
+        port: Of a servo arm: link to the serial port, relative to the run's folder or to that of the arm's namespace.
         camera_socket: Where the robot's camera offers its images instead of publishing them, relative to the run's
             folder: as a webcam does behind its device.
         mishaps: What goes wrong before each object is pointed at, in order; see `sim.mishaps`.
@@ -101,6 +103,7 @@ class Config(NodeConfig):
     scene: Scene = "rule_learning"
     seed: int = Field(default=0, ge=0)
     robot: RobotFolder = Path("robot_description/hoap3")
+    robots: dict[str, RobotFolder] = Field(default_factory=dict)
     camera: bool = True
     video: bool = False
     measures: Measures | None = None
@@ -175,4 +178,4 @@ def _keep_pace(bus: Bus, due_s: float) -> float:
 
 
 if __name__ == "__main__":
-    main(run, SUBSCRIBES, PUBLISHES, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config, every_namespace=True)

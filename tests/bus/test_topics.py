@@ -38,6 +38,35 @@ def test_a_topic_is_found_by_name_and_a_wrong_name_gets_a_hint() -> None:
         topics.by_name("camera/imgae")
 
 
+@pytest.mark.parametrize(
+    ("name", "on_the_bus"),
+    [
+        ("arm/safety", "left/arm/safety"),
+        ("speech", "left/speech"),
+        ("truth/state", "truth/left/state"),
+        ("clock", "clock"),
+        ("operator/stop", "operator/stop"),
+        ("operator/arm", "left/operator/arm"),
+        ("status/camera", "status/camera"),
+    ],
+)
+def test_a_topic_exists_in_each_namespace_but_what_is_of_the_whole_run(name: str, on_the_bus: str) -> None:
+    assert topics.name_in("left", name) == on_the_bus
+    assert topics.name_in("", name) == name
+    topic = topics.by_name(on_the_bus)
+    assert topic.name == on_the_bus
+    assert topic.type is topics.by_name(name).type
+    assert topics.split_name(on_the_bus) == (("left", name) if on_the_bus != name else ("", name))
+
+
+@pytest.mark.parametrize(
+    "name", ["left/clock", "left/operator/stop", "left/right/speech", "left/speach", "truth/left/x"]
+)
+def test_what_is_in_no_namespace_is_no_topic(name: str) -> None:
+    with pytest.raises(KeyError, match="no topic"):
+        topics.by_name(name)
+
+
 @pytest.mark.parametrize("node", ["a/b", "A", "", "x y"])
 def test_a_bad_node_name_is_refused(node: str) -> None:
     with pytest.raises(ValueError, match="node name"):

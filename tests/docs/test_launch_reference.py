@@ -32,7 +32,7 @@ def rows_of(schema, model):
 
 def type_of(field):
     if "anyOf" in field:
-        return " or ".join(type_of(choice) for choice in field["anyOf"])
+        return " or ".join(dict.fromkeys(type_of(choice) for choice in field["anyOf"]))
     if "enum" in field:
         return ", ".join(field["enum"])
     if "$ref" in field:
@@ -48,6 +48,7 @@ SCHEMA = editor_schema("launch")
 MODELS = {
     "launch file": SCHEMA,
     "node": SCHEMA["$defs"]["NodeSettings"],
+    "included file": SCHEMA["$defs"]["IncludedFile"],
     "bus": SCHEMA["$defs"]["BusSettings"],
     "budget": SCHEMA["$defs"]["RestartBudget"],
     "host": SCHEMA["$defs"]["HostSettings"],

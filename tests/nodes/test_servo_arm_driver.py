@@ -23,7 +23,7 @@ from paramove.bus.publisher import Publisher
 from paramove.bus.settings import BusSettings
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState, StopRequest
-from paramove.operator.terminal import request_arming, stop_arm
+from paramove.operator.terminal import request_arming, stop_arms
 from paramove.robots.description import RobotDescription
 from sim.emulated_arm import emulated_servos
 
@@ -144,7 +144,7 @@ def pressed_on(name: str):
 
 
 def pressed_at_a_terminal(run: Run) -> str:
-    assert stop_arm(run.folder, "terminal", PATIENT_S) is not None
+    assert stop_arms(run.folder, "terminal", PATIENT_S)[""] is not None
     return "stopped from the terminal by a person"
 
 

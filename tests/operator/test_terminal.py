@@ -14,7 +14,7 @@ from paramove.bus.bus import Bus
 from paramove.bus.endpoint import TopicTakenError
 from paramove.bus.settings import BusSettings
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
-from paramove.operator.terminal import request_arming, stop_arm
+from paramove.operator.terminal import request_arming, stop_arms
 from paramove.safety.gate_io import PERSON_STOP
 
 FAULT = SafetyFault(code="not_calibrated", detail="this one is not calibrated")
@@ -28,12 +28,13 @@ def folder():
 
 
 @contextlib.contextmanager
-def driver(folder, heard_topics, before, answers_to):
+def driver(folder, heard_topics, before, answers_to, namespace=""):
     """An arm's driver in a thread of its own, in a state, and what it says to what it hears; yields what that was."""
     heard, made, ready = [], [], threading.Event()
 
     def drive():
-        with Bus("driver", BusSettings(folder=folder), heard_topics, (topics.ARM_SAFETY,)) as bus:
+        settings = BusSettings(folder=folder, namespace=namespace)
+        with Bus(f"{namespace}driver", settings, heard_topics, (topics.ARM_SAFETY,)) as bus:
             made.append(bus)
             bus.publish(topics.ARM_SAFETY, before)
             ready.set()
@@ -51,7 +52,7 @@ def driver(folder, heard_topics, before, answers_to):
 
 
 @contextlib.contextmanager
-def gate(folder, before, *answers):
+def gate(folder, before, *answers, namespace=""):
     """A driver that says the same to every word to arm; yields the words that it heard."""
     words = []
 
@@ -59,7 +60,7 @@ def gate(folder, before, *answers):
         words.append((word.armed, word.source))
         return answers
 
-    with driver(folder, (topics.OPERATOR_ARM,), before, answers_to):
+    with driver(folder, (topics.OPERATOR_ARM,), before, answers_to, namespace):
         yield words
 
 
@@ -117,13 +118,13 @@ def stopped(request):
     return [state("STOPPING", fault)]
 
 
-def gate_for_stops(folder, answers_to=stopped):
-    return driver(folder, topics.STOPS, state("ARMED"), answers_to)
+def gate_for_stops(folder, answers_to=stopped, namespace=""):
+    return driver(folder, topics.STOPS, state("ARMED"), answers_to, namespace)
 
 
 def test_the_gate_answers(folder):
     with gate_for_stops(folder) as heard:
-        answer = stop_arm(folder, "terminal", 10.0)
+        answer = stop_arms(folder, "terminal", 10.0)[""]
     assert answer.state == SafetyState.STATE_STOPPING
     assert answer.faults[0].detail == "stopped from the terminal by a person"
     assert {event.message.source for event in heard} == {"terminal"}
@@ -131,7 +132,7 @@ def test_the_gate_answers(folder):
 
 def test_the_live_page_is_no_obstacle(folder):
     with gate_for_stops(folder) as heard, Bus("dashboard", BusSettings(folder=folder), (), (topics.OPERATOR_STOP,)):
-        answer = stop_arm(folder, "terminal", 10.0)
+        answer = stop_arms(folder, "terminal", 10.0)[""]
     assert answer is not None
     assert {event.topic.name for event in heard} == {"operator/estop"}
 
@@ -139,13 +140,13 @@ def test_the_live_page_is_no_obstacle(folder):
 def test_the_topics_are_free_again_afterwards(folder):
     with gate_for_stops(folder):
         for _ in range(2):
-            assert stop_arm(folder, "terminal", 10.0) is not None
+            assert stop_arms(folder, "terminal", 10.0)[""] is not None
 
 
 def test_silence_is_no_stop(folder):
     with gate_for_stops(folder, lambda request: []):
-        assert stop_arm(folder, "terminal", 0.3) is None
-    assert stop_arm(folder, "terminal", 0.1) is None
+        assert stop_arms(folder, "terminal", 0.3) == {"": None}
+    assert stop_arms(folder, "terminal", 0.1) == {"": None}
 
 
 def test_when_others_say_all_stops_it_is_told(folder):
@@ -153,4 +154,30 @@ def test_when_others_say_all_stops_it_is_told(folder):
         Bus("dashboard", BusSettings(folder=folder), (), topics.STOPS),
         pytest.raises(TopicTakenError, match="other programs already publish operator/stop and operator/estop"),
     ):
-        stop_arm(folder, "terminal", 0.1)
+        stop_arms(folder, "terminal", 0.1)
+
+
+def test_one_stop_stops_the_arms_of_all_namespaces(folder):
+    with gate_for_stops(folder, namespace="left") as left, gate_for_stops(folder, namespace="right") as right:
+        answers = stop_arms(folder, "terminal", 10.0)
+    assert {name: answer.state for name, answer in answers.items()} == dict.fromkeys(
+        ("left", "right"), SafetyState.STATE_STOPPING
+    )
+    assert {event.message.source for event in (*left, *right)} == {"terminal"}
+
+
+def test_an_arm_that_does_not_answer_a_stop_is_named(folder):
+    with gate_for_stops(folder, namespace="left"), gate_for_stops(folder, lambda request: [], "right"):
+        answers = stop_arms(folder, "terminal", 0.5)
+    assert answers["left"] is not None
+    assert answers["right"] is None
+
+
+def test_a_request_to_arm_reaches_the_arm_of_its_namespace_alone(folder):
+    with (
+        gate(folder, state("DISARMED"), state("ARMED"), namespace="left") as left,
+        gate(folder, state("DISARMED"), state("ARMED"), namespace="right") as right,
+    ):
+        answer = request_arming(folder, True, 10.0, "right")
+    assert answer.state == SafetyState.STATE_ARMED
+    assert (left, right) == ([], [(True, "terminal")])

@@ -308,3 +308,119 @@ def test_a_missing_overlay_is_told_with_those_of_this_launch_file(folder):
         load(folder, "good", ["emulatd"])
     with pytest.raises(LaunchFileMissingError, match=r"there are: .*emulated, slow"):
         load(folder, "good", ["nothing_like_it"])
+
+
+ARM = """\
+description: An arm
+bus: {clock: simulated}
+default_overlays: [emulated]
+seed_parameters: [world.seed]
+connections: [driver.port]
+external: [relocation/goal]
+after_run: paramove.runs.servo_arm
+headless: {world.video: false}
+needs: {model: {file: "{driver.robot}/model", about: a model, made_by: "paramove train {driver.robot}"}}
+nodes:
+  driver: {module: nodes.driver, parameters: {robot: koch, port: a}, after: [world]}
+  recorder: {module: nodes.recorder}
+"""
+TWO = """\
+include:
+  left: {launch: arm}
+  right: {launch: arm, robot: other, without: [recorder]}
+seed_parameters: [watch.seed]
+nodes:
+  watch: {module: nodes.watch}
+  right_driver: {parameters: {port: b}}
+"""
+
+
+@pytest.fixture
+def two_arms(launches):
+    (launches / "overlays" / "arm").mkdir(parents=True)
+    (launches / "arm.yaml").write_text(ARM)
+    (launches / "overlays" / "arm" / "emulated.yaml").write_text("nodes: {world: {module: sim.world}}\n")
+    (launches / "overlays" / "arm" / "real.yaml").write_text(
+        "seed_parameters: []\nheadless: {world.video: null}\nnodes: {driver: {after: null}}\n"
+    )
+    (launches / "two.yaml").write_text(TWO)
+    return launches
+
+
+def test_the_nodes_of_an_included_file_get_a_namespace_and_names_that_begin_with_it(two_arms):
+    file = load(two_arms, "two").file
+    assert {name: node.namespace for name, node in file.nodes.items()} == {
+        "left_driver": "left",
+        "left_recorder": "left",
+        "left_world": "left",
+        "right_driver": "right",
+        "right_world": "right",
+        "watch": "",
+    }
+    assert file.namespaces == ("left", "right")
+    assert file.nodes["left_driver"].after == ["left_world"]
+    assert file.nodes["left_driver"].parameters == {"robot": "koch", "port": "a"}
+    assert file.nodes["right_driver"].parameters == {"robot": "other", "port": "b"}
+    assert file.bus.clock == "simulated"
+
+
+def test_other_keys_of_an_included_file_name_its_nodes_and_topics(two_arms):
+    file = load(two_arms, "two").file
+    assert file.seed_parameters == ["left_world.seed", "right_world.seed", "watch.seed"]
+    assert file.connections == ["left_driver.port", "right_driver.port"]
+    assert file.external == ["left/relocation/goal", "right/relocation/goal"]
+    assert file.headless == {"left_world.video": False, "right_world.video": False}
+    assert file.after_run_of == dict.fromkeys(("left", "right"), "paramove.runs.servo_arm")
+    assert file.after_run is None
+    assert file.needs["left_model"].file == "{left_driver.robot}/model"
+    assert file.needs["right_model"].made_by == "paramove train {right_driver.robot}"
+
+
+def test_settings_name_nodes_by_their_full_names(two_arms):
+    assert load(two_arms, "two", None, ["left_driver.robot=c"]).file.nodes["left_driver"].parameters["robot"] == "c"
+
+
+def test_an_overlay_chooses_other_overlays_of_an_included_file(two_arms):
+    (two_arms / "overlays" / "two").mkdir()
+    (two_arms / "overlays" / "two" / "really.yaml").write_text("include: {left: {overlays: [real]}}\n")
+    nodes = load(two_arms, "two", ["really"]).file.nodes
+    assert "left_world" not in nodes
+    assert "right_world" in nodes
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "message"),
+    [
+        ("launch: arm}", "launch: arn}", "two.yaml:2:10", "there is no launch file 'arn'"),
+        ("launch: arm}", "launch: ../arm}", "two.yaml:2:10", "expected the plain name of a launch file"),
+        ("launch: arm}", "launch: two}", "two.yaml:2:10", "two includes others itself"),
+        ("launch: arm}", "launch: arm, overlays: [emulator]}", "two.yaml:2:34", "did you mean 'emulated'?"),
+        ("{launch: arm}", "arm", "two.yaml:2:3", "expected a mapping such as"),
+        ("launch: arm}", "file: arm}", "two.yaml:2:10", "file"),
+        ("left:", "truth:", "two.yaml:2:3", "'truth' is no namespace"),
+        ("left:", "le-ft:", "two.yaml:2:3", "'le-ft' is no namespace"),
+        ("[recorder]", "[recrder]", "two.yaml:3:48", "arm has no node 'recrder'"),
+        ("{parameters: {port: b}}", "{restart: x}", "two.yaml:7:18", "'never', 'on-failure' or 'always'"),
+    ],
+)
+def test_what_is_wrong_with_an_included_file_is_rejected_at_its_place(two_arms, old, new, place, message):
+    (two_arms / "two.yaml").write_text(TWO.replace(old, new, 1))
+    with pytest.raises(DocumentError) as error:
+        load(two_arms, "two")
+    assert place in str(error.value)
+    assert message in str(error.value)
+
+
+def test_a_mistake_in_the_included_file_is_reported_there(two_arms):
+    (two_arms / "arm.yaml").write_text(ARM.replace("module: nodes.recorder", "modul: nodes.recorder"))
+    with pytest.raises(DocumentError, match=r"arm.yaml:12:14: .*'module'"):
+        load(two_arms, "two")
+
+
+def test_two_included_files_cannot_have_different_buses(two_arms):
+    (two_arms / "still.yaml").write_text("nodes: {driver: {module: nodes.driver}}\n")
+    (two_arms / "two.yaml").write_text(TWO.replace("launch: arm}", "launch: still}", 1))
+    with pytest.raises(DocumentError, match="'clock' differs: left monotonic, right simulated"):
+        load(two_arms, "two")
+    (two_arms / "two.yaml").write_text(TWO.replace("launch: arm}", "launch: still}", 1) + "bus: {clock: monotonic}\n")
+    assert load(two_arms, "two").file.bus.clock == "monotonic"

@@ -108,11 +108,11 @@ nodes:
 def test_node_that_hangs_at_start_is_named_with_its_last_words(workspace):
     workspace.write("""
 nodes:
-  slow: {module: nodes.silent_actor, ready_timeout_s: 2.5, parameters: {hangs: true}}
+  slow: {module: nodes.silent_actor, ready_timeout_s: 6, parameters: {hangs: true}}
 """)
     outcome, _, _ = workspace.run()
     assert outcome.code == exit_codes.FAILURE
-    assert "slow was not ready within 2.5 s, last message: warming up the lamp" in outcome.reason
+    assert "slow was not ready within 6 s, last message: warming up the lamp" in outcome.reason
 
 
 def test_required_node_that_ends_early_ends_the_run_as_a_failure(workspace):
@@ -273,3 +273,22 @@ nodes:
     shown = launcher.communicate(timeout=60)[0]
     assert launcher.returncode == exit_codes.OK, shown
     assert "= 1 is open" in shown
+
+
+def test_a_run_ends_when_each_namespace_has_done_its_work(workspace):
+    (workspace.root / "nodes" / "judge.py").write_text(
+        "import sys, pathlib\n(pathlib.Path(sys.argv[1]) / 'judged').touch()\n"
+    )
+    workspace.write("""
+after_run_of: {left: nodes.judge}
+nodes:
+  left_short: {module: nodes.silent_actor, namespace: left, ends_run: true, parameters: {lasts_s: 0.1}}
+  right_long: {module: nodes.silent_actor, namespace: right, ends_run: true, parameters: {lasts_s: 1.5}}
+  right_other: {module: nodes.silent_actor, namespace: right}
+""")
+    outcome, folder, shown = workspace.run()
+    assert outcome.code == exit_codes.OK, shown
+    ended = [event["node"] for event in workspace.happened if event["event"] in ("ended", "stopped")]
+    assert ended == ["left_short", "right_long", "right_other"]
+    assert (folder.path / "left" / "judged").exists(), "the folder of its nodes"
+    assert (folder.path / "right" / "nodes" / "long.yaml").exists(), "the nodes have their names in it"

@@ -195,3 +195,29 @@ def test_a_topic_that_nobody_may_or_needs_to_publish_from_outside_is_rejected(wo
     with pytest.raises(DocumentError) as raised:
         checked(workspace, f"external: [{external}]\nnodes: {{main: {{module: nodes.goal_reader, truth: true}}}}")
     assert reason in next(finding.message for finding in raised.value if finding.position.line == 1)
+
+
+def test_the_same_node_in_two_namespaces_has_topics_of_its_own(workspace):
+    two = "\n".join(
+        f"  {side}_{name}: {{module: nodes.{module}, namespace: {side}}}"
+        for side in ("left", "right")
+        for name, module in (("robot", "actor"), ("ear", "listener"))
+    )
+    checked(workspace, f"nodes:\n{two}")
+    alone = two.replace("  right_robot: {module: nodes.actor, namespace: right}\n", "")
+    with pytest.raises(DocumentError, match="'right_ear' subscribes to right/speech, which no node"):
+        checked(workspace, f"nodes:\n{alone}")
+
+
+def test_a_node_for_every_namespace_has_the_topics_of_each(workspace):
+    source = (workspace.root / "nodes" / "listener.py").read_text()
+    entry = 'if __name__ == "__main__":\n    main(run, SUBSCRIBES, PUBLISHES, Config, every_namespace=True)\n'
+    (workspace.root / "nodes" / "recorder.py").write_text(source + entry)
+    text = """nodes:
+  left_robot: {module: nodes.actor, namespace: left}
+  recorder: {module: nodes.recorder, optional_topics: [speech]}
+  left_recorder: {module: nodes.recorder, namespace: left}
+"""
+    interfaces = checked(workspace, text)
+    assert [topic.name for topic in interfaces["recorder"].subscribes] == ["speech", "left/speech"]
+    assert interfaces["left_recorder"].subscribes == (topics.SPEECH,)

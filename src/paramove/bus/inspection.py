@@ -22,6 +22,7 @@ from paramove.bus.sequence import SequenceCounter
 from paramove.bus.settings import nodes_in
 from paramove.bus.subscriber import Received, Subscriber
 from paramove.bus.topics import Topic
+from paramove.msgs.safety_state_pb2 import SafetyState
 
 _POLL_MS = 50
 _LONGEST_DELAY_S = 60.0
@@ -133,9 +134,27 @@ class Measurement:
 
 
 def publishers(folder: Path) -> list[PublisherOnBus]:
-    """Every topic of the table, and every status topic that was published in the folder."""
+    """Every topic of the table, and every status topic and topic of a namespace that was published in the folder."""
     public = [topic for topic in topics.TOPICS if not topic.truth]
-    return [publisher_of(folder, topic) for topic in (*public, *map(topics.status, nodes_in(folder)))]
+    others = [*_of_namespaces(folder), *map(topics.status, nodes_in(folder))]
+    return [publisher_of(folder, topic) for topic in (*public, *others)]
+
+
+def _of_namespaces(folder: Path) -> Iterator[Topic]:
+    """Topics of namespaces whose sockets are in the folder, by name."""
+    for path in sorted(folder.glob("*.*")):
+        name = path.name.replace(".", "/")
+        if not topics.is_name(name) or not topics.split_name(name)[0]:
+            continue
+        topic = topics.known_by(name)
+        if topic is not None:
+            yield topic
+
+
+def gates(folder: Path) -> dict[str, Topic]:
+    """Topics of the states of safety gates that run in a folder, by their namespaces."""
+    known = [topics.ARM_SAFETY, *(topic for topic in _of_namespaces(folder) if topic.type is SafetyState)]
+    return {topics.split_name(topic.name)[0]: topic for topic in known if publisher_of(folder, topic).alive}
 
 
 def publisher_of(folder: Path, topic: Topic) -> PublisherOnBus:

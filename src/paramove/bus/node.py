@@ -105,6 +105,7 @@ def main(
     publishes: Sequence[Topic],
     config_type: type[Config],
     visitor: bool = False,
+    every_namespace: bool = False,
 ) -> None:
     """Runs a node and exits the process.
 
@@ -114,6 +115,8 @@ def main(
         publishes: Topics that it publishes.
         config_type: Its parameters.
         visitor: Whether other nodes are ready without being connected with it; see `Bus.connect`.
+        every_namespace: Whether it subscribes to and publishes, where it is in no namespace itself, these topics of all
+            namespaces. Its loop then names no topics: `bus.events()`.
     """
     parser = argparse.ArgumentParser(description=sys.modules[run.__module__].__doc__)
     parser.add_argument("--config", type=Path, required=True, help="YAML file written by the supervisor")
@@ -126,6 +129,8 @@ def main(
     log_to_stderr(file.node)
     try:
         live = LiveParameters(file.node, config, config.CHANGEABLE)
+        if every_namespace:
+            subscribes, publishes = map(file.bus.in_every_namespace, (subscribes, publishes))
         bus = Bus(file.node, file.bus, subscribes, publishes, file.run_folder)
     except (TopicTakenError, BusFolderError) as error:
         _log.error("%s", error)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from paramove.bus.topics import Topic
+from paramove.bus.topics import Topic, name_in, topic_in
 from paramove.documents import InputError, checked_name
 
 
@@ -56,6 +57,8 @@ class BusSettings(BaseModel):
         lockstep: The simulator waits for this process at every tick. Only with the simulated clock.
         truth_folder: Of the sockets of topics under `truth/`; given to the simulator and evaluators only.
         remaps: Topic name in the node -> topic name on the bus.
+        namespace: That the node is in, of which its other topics are; "" for none.
+        namespaces: All of the run.
         members: Names of all nodes that time waits for in lockstep. Read by the simulator only.
         begun_ns: When the run began, by its clock.
     """
@@ -67,6 +70,8 @@ class BusSettings(BaseModel):
     lockstep: bool = False
     truth_folder: Path | None = None
     remaps: dict[str, str] = Field(default_factory=dict)
+    namespace: str = ""
+    namespaces: tuple[str, ...] = ()
     members: tuple[str, ...] = ()
     begun_ns: int = 0
 
@@ -82,4 +87,11 @@ class BusSettings(BaseModel):
 
     def name_of(self, topic: Topic) -> str:
         """Name of the topic on the bus."""
-        return self.remaps.get(topic.name, topic.name)
+        remapped = self.remaps.get(topic.name)
+        return name_in(self.namespace, topic.name) if remapped is None else remapped
+
+    def in_every_namespace(self, topics: Sequence[Topic]) -> tuple[Topic, ...]:
+        """The topics, and for a node outside of namespaces those of each namespace, too, each once."""
+        spaces = ("", *self.namespaces) if not self.namespace else ("",)
+        named = [topic_in(space, topic) for space in spaces for topic in topics]
+        return tuple({topic.name: topic for topic in named}.values())

@@ -43,6 +43,7 @@ _OF_NODES = frozenset(kind.DESCRIPTOR.full_name for kind in (Clock, LinkState, N
 RESERVED_TYPES = _OF_PERSONS | _OF_NODES
 """Types of messages on which it depends who may arm and stop, and what time it is: for topics of the library alone."""
 _STATUS_PREFIX = "status/"
+_TRUTH_PREFIX = "truth/"
 
 
 class Profile(enum.Enum):
@@ -89,7 +90,7 @@ class Topic:
     @property
     def truth(self) -> bool:
         """Whether only the simulator and evaluators may know the topic's folder."""
-        return self.name.startswith("truth/")
+        return self.name.startswith(_TRUTH_PREFIX)
 
     @property
     def reserved_for(self) -> str:
@@ -248,6 +249,8 @@ ARMINGS = (OPERATOR_ARM, OPERATOR_ARM_AT_START, OPERATOR_ARM_AWAY)
 """Arming requests: a driver subscribes to all of them."""
 STOPS = (*PERSONS_STOPS, OPERATOR_STOP_AWAY)
 """Stops: a driver subscribes to all of them."""
+SHARED = frozenset(topic.name for topic in (CLOCK, PARAMETERS_SET, HOSTS_LINK, *STOPS))
+"""Topics that a run has once, as the statuses: one stop stops all its arms. All others exist once in each namespace."""
 
 OWN_TABLE = "msgs/topics.yaml"
 """File of a workspace with topics of its own; see `topic_table`."""
@@ -269,6 +272,33 @@ def status(node: str) -> Topic:
     if not _NAME.fullmatch(name) or "/" in node:
         raise ValueError(f"node name {node!r}: expected lower-case letters, digits and '_' only")
     return Topic(name, NodeStatus, 1, _LATCHED, recorded=True)
+
+
+def name_in(namespace: str, name: str) -> str:
+    """Name on the bus of a topic that a node in a namespace calls `name`; "" is the run itself.
+
+    `left/arm/safety` for `arm/safety`, `truth/left/state` for `truth/state`; statuses and the topics of `SHARED` are
+    called the same in all namespaces.
+    """
+    if not namespace or name in SHARED or name.startswith(_STATUS_PREFIX):
+        return name
+    if name.startswith(_TRUTH_PREFIX):
+        return f"{_TRUTH_PREFIX}{namespace}/{name.removeprefix(_TRUTH_PREFIX)}"
+    return f"{namespace}/{name}"
+
+
+def topic_in(namespace: str, topic: Topic) -> Topic:
+    """The topic as a program outside of that namespace names it."""
+    return replace(topic, name=name_in(namespace, topic.name))
+
+
+def split_name(name: str) -> tuple[str, str]:
+    """Namespace of a name on the bus, "" for none, and the name in it: the reverse of `name_in`."""
+    if name.startswith(_STATUS_PREFIX) or _row(name) is not None:
+        return "", name
+    truth = _TRUTH_PREFIX if name.startswith(_TRUTH_PREFIX) else ""
+    namespace, _, rest = name.removeprefix(truth).partition("/")
+    return (namespace, truth + rest) if rest else ("", name)
 
 
 OLD_NAMES = {f"{camera}/light": f"{camera}/image_raw" for camera in ("camera", *(f"camera_{n}" for n in range(1, 5)))}
@@ -345,14 +375,30 @@ def named(name: str | Topic) -> Topic:
 
 
 def by_name(name: str) -> Topic:
-    """Topic of that name or former name; raises KeyError that names the nearest topics."""
-    name = OLD_NAMES.get(name, name)
+    """Topic of that name, former name or name in a namespace; raises KeyError that names the nearest topics."""
+    topic = known_by(OLD_NAMES.get(name, name))
+    if topic is None:
+        names = (topic.name for topic in LIBRARY + own())
+        raise KeyError(f"no topic {name!r} here; {nearest(name, names)}")
+    return topic
+
+
+def known_by(name: str) -> Topic | None:
+    """Topic of that name, also in a namespace; None if there is none in any. Raises ValueError as `status` does."""
     if name.startswith(_STATUS_PREFIX):
         return status(name.removeprefix(_STATUS_PREFIX))
+    topic = _row(name)
+    if topic is not None:
+        return topic
+    namespace, local = split_name(name)
+    topic = _row(local)
+    if topic is None or not namespace or local in SHARED:
+        return None
+    return topic_in(namespace, topic)
+
+
+def _row(name: str) -> Topic | None:
+    """Row of the library's table, or else of the workspace's."""
     if name in _LIBRARY_BY_NAME:
         return _LIBRARY_BY_NAME[name]
-    for topic in own():
-        if topic.name == name:
-            return topic
-    names = (topic.name for topic in LIBRARY + own())
-    raise KeyError(f"no topic {name!r} here; {nearest(name, names)}")
+    return next((topic for topic in own() if topic.name == name), None)

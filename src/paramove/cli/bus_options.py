@@ -9,11 +9,17 @@ from typing import Annotated, Any
 
 import typer
 
-from paramove.bus import Topic, running_folder, topics
+from paramove.bus import Topic, inspection, running_folder, topics
 from paramove.cli import completions
 from paramove.cli.output import aligned, ended
-from paramove.documents import InputError, exit_codes
+from paramove.documents import InputError, exit_codes, nearest
 
+NamespaceOption = Annotated[
+    str | None,
+    typer.Option(
+        "--namespace", metavar="NAME", help="of the arm, where several run", autocompletion=completions.namespaces
+    ),
+]
 DomainOption = Annotated[
     str | None,
     typer.Option(
@@ -49,6 +55,19 @@ OLD_KEYS = {"publisher": "said by", "published": "said so far", "received": "hea
 def with_old_keys(row: dict[str, Any]) -> dict[str, Any]:
     """A row for JSON, with the values of renamed keys by both names."""
     return row | {old: row[key] for key, old in OLD_KEYS.items() if key in row}
+
+
+def arm_in(folder: Path, namespace: str | None) -> str:
+    """Namespace of the arm that a person means; ends the command if several run and none is named, or not that one."""
+    gates = inspection.gates(folder)
+    if namespace is None:
+        if len(gates) > 1:
+            named = " or ".join(f"--namespace {name}" for name in gates if name)
+            raise ended(f"{len(gates)} arms run here; which one? {named}", exit_codes.USAGE)
+        return next(iter(gates), "")
+    if namespace not in gates:
+        raise ended(f"no arm in the namespace {namespace!r}; {nearest(namespace, gates)}", exit_codes.USAGE)
+    return namespace
 
 
 def show(rows: Sequence[dict[str, Any]], as_json: bool) -> None:

@@ -90,6 +90,15 @@ def nodes() -> list[str]:
     return []
 
 
+def namespaces() -> list[str]:
+    """Namespaces of the arms that run."""
+    from paramove.bus import default_folder, inspection
+
+    with contextlib.suppress(OSError):
+        return [name for name in inspection.gates(default_folder()) if name]
+    return []
+
+
 def topics() -> list[str]:
     """Topics of the table, and the status topics of the nodes on the bus."""
     from paramove.bus import TOPICS

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from paramove.bus import TopicTakenError
-from paramove.cli.bus_options import DomainOption
+from paramove.bus import TopicTakenError, running_folder
+from paramove.cli.bus_options import DomainOption, NamespaceOption, arm_in
 from paramove.cli.output import JsonOption, ended, one_line
 from paramove.cli.topic import readable
-from paramove.client import NoMessageError, connect
+from paramove.client import NoMessageError, Run
 from paramove.documents import exit_codes, printable
 from paramove.msgs.relocation_pb2 import RelocationStatus
 
@@ -22,6 +22,7 @@ app = typer.Typer(name="goal", help="Send the robot a goal.", no_args_is_help=Tr
 def send(
     content: Annotated[str, typer.Argument(help="a paramove.msgs.RelocationGoal in YAML, such as '{kind: KIND_REST}'")],
     domain: DomainOption = None,
+    namespace: NamespaceOption = None,
     as_json: JsonOption = False,
     wait_s: Annotated[float, typer.Option("--wait", min=0.1, metavar="SECONDS", help="for its last state")] = 60.0,
 ) -> None:
@@ -30,11 +31,13 @@ def send(
     The run has to leave its goals to others, as `paramove launch dynamixel_arm --with emulated --with external_goals`
     does: no node sends goals, and `external` names `relocation/goal`. The arm moves only while it is armed.
 
-    Exit codes: 0 succeeded; 3 failed or rejected; 1 no last state in time; 66 nothing runs; 75 a node sends goals;
-    78 that is no goal.
+    Exit codes: 0 succeeded; 1 no last state in time; 2 several arms run, and none was named; 3 failed or rejected; 66
+    nothing runs; 75 a node sends goals; 78 that is no goal.
     """
     try:
-        with one_line(), connect(domain, "paramove goal") as run:
+        with one_line():
+            folder = running_folder(domain)
+        with one_line(), Run(folder, "paramove goal", arm_in(folder, namespace)) as run:
             status = run.send_goal(content, wait_s)
     except NoMessageError as error:
         raise ended(str(error), exit_codes.FAILURE) from error

@@ -26,6 +26,7 @@ def run(
         list[str] | None,
         typer.Option("--remap", metavar="TOPIC=TOPIC", help="another topic in the place of one; may be repeated"),
     ] = None,
+    namespace: Annotated[str, typer.Option(metavar="NAME", help="in which its topics are")] = "",
     domain: DomainOption = None,
 ) -> None:
     """Run one node beside those of a running application; where none runs, alone, as an application of one node.
@@ -42,7 +43,7 @@ def run(
     from paramove.workspace import Workspace
 
     def loaded(_: Workspace) -> Launch:
-        return node_alone(module, name, settings or [], remaps or [])
+        return node_alone(module, name, settings or [], remaps or [], namespace)
 
     folder = default_folder(domain)
     if not folder.is_dir():

@@ -24,7 +24,7 @@ from paramove.client.content import message_of
 from paramove.documents import InputError
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.safety_state_pb2 import SafetyState
-from paramove.operator import stop_arm
+from paramove.operator import stop_arms
 
 _SERVE_S = 0.02
 _CLOCK_S = 2.0
@@ -40,16 +40,17 @@ class NotConnectedError(RuntimeError):
     """A connection is used before or after its `with` block."""
 
 
-def connect(domain: str | None = None, name: str = "client") -> Run:
+def connect(domain: str | None = None, name: str = "client", namespace: str = "") -> Run:
     """The application that runs in a domain, for a `with` block.
 
     Args:
         domain: Default: $PARAMOVE_DOMAIN, else "default".
         name: Of this program, for the messages of others.
+        namespace: In which it names topics: `arm/safety` is then `left/arm/safety` on the bus.
 
     Raises InputError if nothing runs there.
     """
-    return Run(running_folder(domain), name)
+    return Run(running_folder(domain), name, namespace)
 
 
 class Run:
@@ -58,14 +59,15 @@ class Run:
     Args:
         folder: Of the run's bus.
         name: Of this program.
+        namespace: See `connect`.
 
     Attributes:
-        name: As given.
+        name, namespace: As given.
         is_simulated: Whether the run's time is simulated; known once connected.
     """
 
-    def __init__(self, folder: Path, name: str = "client") -> None:
-        self._folder, self.name = folder, name
+    def __init__(self, folder: Path, name: str = "client", namespace: str = "") -> None:
+        self._folder, self.name, self.namespace = folder, name, namespace
         self._subscribers: dict[str, Subscriber] = {}
         self._publishers: dict[str, Publisher] = {}
         self._received: dict[str, deque[Received]] = {}
@@ -107,7 +109,7 @@ class Run:
 
     def latest(self, topic: str | Topic, timeout_s: float = 5.0) -> Any:
         """The latest message of a topic; waits for one if there is none yet. Raises NoMessageError and InputError."""
-        row = self._subscribe(topics.named(topic))
+        row = self._subscribe(self._named(topic))
         self._step(0.0)
         self._until(lambda: row.name in self._latest, timeout_s)
         if row.name not in self._latest:
@@ -121,7 +123,7 @@ class Run:
         """
         if math.isnan(seconds):
             raise ValueError("seconds: a number expected, found nan")
-        rows = [self._subscribe(topics.named(name)) for name in names]
+        rows = [self._subscribe(self._named(name)) for name in names]
         until_s = time.monotonic() + seconds
         while True:
             for row in rows:
@@ -149,7 +151,7 @@ class Run:
             ValueError: The message is larger than the topic allows.
             NoMessageError: The run's simulated time is not known.
         """
-        row = topics.named(topic)
+        row = self._named(topic)
         message = message_of(row.type, content) if isinstance(content, str | Mapping) else content
         publisher = self.offer(row)
         self.wait_for_subscribers([publisher], wait_s)
@@ -198,12 +200,12 @@ class Run:
         message.CopyFrom(message_of(RelocationGoal, goal) if isinstance(goal, str | Mapping) else goal)
         message.id = message.id or f"{self.name} {time.monotonic_ns()}"
         message.attempt = message.attempt or 1
-        status_topic = self._subscribe(topics.RELOCATION_STATUS)
+        status_topic = self._subscribe(self._named(topics.RELOCATION_STATUS))
         self._received[status_topic.name].clear()
         until_s, latest = time.monotonic() + timeout_s, RelocationStatus()
         while time.monotonic() < until_s:
             if latest.state == RelocationStatus.STATE_UNSPECIFIED:  # repeated until it is acknowledged
-                self.publish(topics.RELOCATION_GOAL.name, message, wait_s=_REPEAT_S)
+                self.publish(topics.RELOCATION_GOAL, message, wait_s=_REPEAT_S)
             for received in self.listen(status_topic.name, seconds=_REPEAT_S):
                 status: RelocationStatus = received.message
                 if status.goal_id == message.id:
@@ -214,18 +216,25 @@ class Run:
         raise NoMessageError(f"goal {message.id!r} has not ended within {timeout_s:g} s; its state is {state}")
 
     def stop(self, timeout_s: float = 2.0) -> SafetyState:
-        """Stops the arm; returns the gate's answer.
+        """Stops all arms of the run; returns the answer of the gate in this namespace, or else of the first.
 
-        Raises NoMessageError if there was none in time: then nobody knows that the arm stops. TopicTakenError as
-        `stop_arm` does.
+        Raises NoMessageError if one has not answered in time: then nobody knows that its arm stops. TopicTakenError as
+        `stop_arms` does.
         """
-        answer = stop_arm(self._folder, self.name, timeout_s)
-        if answer is None:
+        answers = stop_arms(self._folder, self.name, timeout_s)
+        answered = {namespace: answer for namespace, answer in answers.items() if answer is not None}
+        if silent := [namespace for namespace in answers if namespace not in answered]:
+            whose = f" of {', '.join(silent)}" if any(silent) else ""
             raise NoMessageError(
-                f"no safety gate has answered the stop within {timeout_s:g} s: the arm may still move; use the switch "
-                "of the motors' power"
+                f"no safety gate{whose} has answered the stop within {timeout_s:g} s: the arm may still move; use the "
+                "switch of the motors' power"
             )
-        return answer
+        return answered.get(self.namespace) or next(iter(answered.values()))
+
+    def _named(self, topic: str | Topic) -> Topic:
+        """A topic by its name on the bus, or by that in this connection's namespace."""
+        row = topics.named(topic)
+        return row if topics.split_name(row.name)[0] else topics.topic_in(self.namespace, row)
 
     def _subscribe(self, topic: Topic) -> Topic:
         if topic.name not in self._subscribers:

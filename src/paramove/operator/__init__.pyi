@@ -5,4 +5,4 @@ from .jogging import Jogging as Jogging
 from .terminal import TERMINAL as TERMINAL
 from .terminal import obeyed as obeyed
 from .terminal import request_arming as request_arming
-from .terminal import stop_arm as stop_arm
+from .terminal import stop_arms as stop_arms

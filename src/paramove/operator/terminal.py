@@ -9,7 +9,7 @@ from pathlib import Path
 
 import zmq
 
-from paramove.bus import BusVisitor, Subscriber, TopicTakenError, publish_now, topics
+from paramove.bus import BusVisitor, Subscriber, TopicTakenError, inspection, publish_now, topics
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState, StopRequest
 from paramove.safety import PERSON_STOP
 
@@ -19,7 +19,7 @@ TERMINAL = "terminal"
 """Source of the request."""
 
 
-def request_arming(folder: Path, armed: bool, timeout_s: float) -> SafetyState | None:
+def request_arming(folder: Path, armed: bool, timeout_s: float, namespace: str = "") -> SafetyState | None:
     """Publishes one request to arm or disarm and waits for the gate's answer.
 
     It is not repeated: a repetition could arm an arm that a fault has just stopped.
@@ -28,6 +28,7 @@ def request_arming(folder: Path, armed: bool, timeout_s: float) -> SafetyState |
         folder: Of the run's bus.
         armed: Whether to arm.
         timeout_s: To wait for the gate, and again for its answer.
+        namespace: Of the arm.
 
     Returns:
         The gate's latest state: armed or not as requested, or with the faults for which it rejects; that from
@@ -38,7 +39,8 @@ def request_arming(folder: Path, armed: bool, timeout_s: float) -> SafetyState |
         BusFolderError: The folder cannot be used.
     """
     with BusVisitor(folder, "request_arming") as bus:
-        publisher, gate = bus.publisher(topics.OPERATOR_ARM), bus.subscriber(topics.ARM_SAFETY)
+        requests, states = (topics.topic_in(namespace, one) for one in (topics.OPERATOR_ARM, topics.ARM_SAFETY))
+        publisher, gate = bus.publisher(requests), bus.subscriber(states)
         before = _until(gate, timeout_s, lambda state: True)
         if before is None or obeyed(before, armed):
             return before
@@ -56,16 +58,17 @@ def obeyed(state: SafetyState, armed: bool) -> bool:
     return is_armed if armed else state.state == SafetyState.STATE_DISARMED
 
 
-def stop_arm(folder: Path, source: str, timeout_s: float) -> SafetyState | None:
-    """Publishes a stop on all free topics of stops, until the gate has latched it or the timeout has passed.
+def stop_arms(folder: Path, source: str, timeout_s: float) -> dict[str, SafetyState | None]:
+    """Publishes a stop on all free topics of stops, until every gate has latched it or the timeout has passed.
 
     Args:
         folder: Of the run's bus.
         source: Where the person pressed, for the message of the fault that the gate latches.
-        timeout_s: To wait for the gate's answer.
+        timeout_s: To wait for the gates' answers.
 
     Returns:
-        The gate's answer, None if there was none.
+        By the arm's namespace the answer of its gate, None if there was none; of a run in which no gate is found, that
+        none has answered.
 
     Raises:
         TopicTakenError: Other programs publish all topics of stops, such as the live page and another terminal.
@@ -87,8 +90,14 @@ def stop_arm(folder: Path, source: str, timeout_s: float) -> SafetyState | None:
             for publisher in publishers:
                 publisher.publish(request, time.monotonic_ns(), time.monotonic_ns())  # a driver heeds what is new
 
-        state = _until(bus.subscriber(topics.ARM_SAFETY), timeout_s, _is_stopped, publish)
-    return state if state is not None and _is_stopped(state) else None
+        publish()  # before anything else is looked for
+        end_s = time.monotonic() + timeout_s
+        answers: dict[str, SafetyState | None] = {}
+        for namespace, topic in (inspection.gates(folder) or {"": topics.ARM_SAFETY}).items():
+            left_s = max(end_s - time.monotonic(), POLL_PERIOD_S)
+            state = _until(bus.subscriber(topic), left_s, _is_stopped, publish)
+            answers[namespace] = state if state is not None and _is_stopped(state) else None
+    return answers
 
 
 def _is_stopped(state: SafetyState) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from paramove.bus import topics
+from paramove.bus import BusSettings, topics
 from paramove.documents import read_document
 from paramove.recording import Recorded
 from paramove.supervision import InterfaceError, read_interface
@@ -90,7 +90,8 @@ def publishers_of(launch_file: Path, workspace: Workspace) -> dict[str, str]:
             interface = read_interface(settings["module"], workspace)
         except (InterfaceError, KeyError):
             continue
-        remaps = settings.get("remaps", {})
-        publishers |= {remaps.get(topic.name, topic.name): node for topic in interface.publishes}
+        remaps, namespace = settings.get("remaps", {}), settings.get("namespace", "")
+        view = BusSettings(folder=Path(), remaps=remaps, namespace=namespace)
+        publishers |= {view.name_of(topic): node for topic in interface.publishes}
         publishers[topics.status(node).name] = node
     return publishers

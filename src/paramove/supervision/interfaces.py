@@ -36,6 +36,7 @@ class Interface:
         publishes: Topics that it publishes, without its status.
         has_config: Whether it has a `Config` that can check parameters.
         needs_parameters: Whether some parameter may have no default value.
+        every_namespace: Whether its topics are, where it is in no namespace itself, those of all namespaces.
     """
 
     path: Path
@@ -43,6 +44,7 @@ class Interface:
     publishes: tuple[Topic, ...]
     has_config: bool
     needs_parameters: bool
+    every_namespace: bool = False
 
 
 def source_of(module: str, workspace: Workspace) -> Path:
@@ -89,7 +91,20 @@ def read_interface(module: str, workspace: Workspace, *, may_import: bool = True
             )
             raise InterfaceError(message) from None
         subscribes, publishes = _imported(module, workspace, path.stat().st_mtime_ns, *names)
-    return Interface(path, subscribes, publishes, config is not None, config is not None and _needs_parameters(config))
+    return Interface(
+        path,
+        subscribes,
+        publishes,
+        has_config=config is not None,
+        needs_parameters=config is not None and _needs_parameters(config),
+        every_namespace=_is_for_every_namespace(tree),
+    )
+
+
+def _is_for_every_namespace(tree: ast.Module) -> bool:
+    """Whether the module calls `main(..., every_namespace=True)`."""
+    keywords = (one for call in ast.walk(tree) if isinstance(call, ast.Call) for one in call.keywords)
+    return any(one.arg == "every_namespace" and ast.unparse(one.value) == "True" for one in keywords)
 
 
 class _NotPlainError(Exception):

@@ -24,7 +24,8 @@ from paramove.documents import (
     read_text,
     read_value,
 )
-from paramove.supervision.launch_schema import LaunchFile
+from paramove.supervision.included_files import with_included
+from paramove.supervision.launch_schema import IncludedFile, LaunchFile
 from paramove.workspace import Workspace
 
 _MODULE = "names joined by dots, such as nodes.camera"
@@ -85,13 +86,35 @@ def load(
     """
     path = _typed(workspace, (_FOLDER,), name, "launch file")
     document, chosen = _with_overlays(workspace, path.stem, _read(path), overlays, robot)
+    document = with_included(document, lambda namespace, about: _included(workspace, document, namespace, about))
     document, findings = _with_values(document, settings, seed, headless, overlays is not None, robot)
     document, wrong_remaps = _with_remaps(document, remaps)
     file = _checked(document, findings + wrong_remaps)
     return Launch(Path(name).stem, tuple(chosen), file, document, seed, headless)
 
 
-def node_alone(module: str, name: str = "", settings: Sequence[str] = (), remaps: Sequence[str] = ()) -> Launch:
+def _included(
+    workspace: Workspace, including: Document, namespace: str, about: IncludedFile
+) -> tuple[LaunchFile, Document]:
+    """A launch file that another one includes in a namespace, with its overlays; checked. Raises DocumentError."""
+    key = ("include", namespace)
+    path = _by_name(workspace, (_FOLDER,), including, (*key, "launch"), about.launch, "a launch file")
+    document = _read(path)
+    if "include" in document.data:
+        raise including.error((*key, "launch"), f"{about.launch} includes others itself; include those instead")
+    if about.overlays is not None:
+        positions: dict[KeyPath, Position] = {("default_overlays",): including.position((*key, "overlays"))}
+        for index in range(len(about.overlays)):
+            positions["default_overlays", str(index)] = including.position((*key, "overlays", str(index)))
+        document = document.overlaid(Document({"default_overlays": about.overlays}, positions))
+    document, _ = _with_overlays(workspace, path.stem, document, None, about.robot)
+    document, findings = _with_values(document, (), robot=about.robot)
+    return _checked(document, findings), document
+
+
+def node_alone(
+    module: str, name: str = "", settings: Sequence[str] = (), remaps: Sequence[str] = (), namespace: str = ""
+) -> Launch:
     """A launch file of one node, whose end is the end of the run and which may miss the publishers of its topics.
 
     Args:
@@ -99,11 +122,12 @@ def node_alone(module: str, name: str = "", settings: Sequence[str] = (), remaps
         name: Of the node; default: the last part of the module.
         settings: Each `parameter=value`; the value is YAML.
         remaps: Each `topic=topic on the bus`.
+        namespace: Of its topics, and the begin of its default name.
 
     Raises DocumentError with all that is wrong.
     """
-    name = name or module.rpartition(".")[2]
-    node = {"module": module, "optional_topics": ["*"], "ends_run": True}
+    name = name or "_".join(filter(None, (namespace, module.rpartition(".")[2])))
+    node = {"module": module, "optional_topics": ["*"], "ends_run": True, "namespace": namespace}
     document = Document({"nodes": {name: node}}, {(): Position(module)})
     document, findings = _with_values(document, [f"{name}.{setting}" for setting in settings])
     document, wrong_remaps = _with_remaps(document, [f"{name}:{remap}" for remap in remaps])
@@ -160,13 +184,15 @@ def _default_overlays(
     return chosen, findings
 
 
-def _by_name(workspace: Workspace, folders: Sequence[Path], document: Document, key: KeyPath, overlay: str) -> Path:
-    """File of an overlay that a file names; raises DocumentError."""
-    if not is_identifier(overlay):
-        raise document.error(key, f"{overlay!r}: expected the plain name of an overlay in {folders[-1]}, no path")
-    path = _named(workspace, folders, overlay)
+def _by_name(
+    workspace: Workspace, folders: Sequence[Path], document: Document, key: KeyPath, name: str, kind: str = "an overlay"
+) -> Path:
+    """File of an overlay or a launch file that a file names; raises DocumentError."""
+    if not is_identifier(name):
+        raise document.error(key, f"{name!r}: expected the plain name of {kind} in {folders[-1]}, no path")
+    path = _named(workspace, folders, name)
     if not path.is_file():
-        message = f"there is no overlay '{overlay}' ({path}); {nearest(overlay, _known(workspace, folders))}"
+        message = f"there is no {kind.partition(' ')[2]} '{name}' ({path}); {nearest(name, _known(workspace, folders))}"
         raise document.error(key, message)
     return path
 

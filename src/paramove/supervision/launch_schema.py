@@ -63,6 +63,9 @@ class NodeSettings(_Checked):
     module: Module = Field(description="Python module that is started, such as nodes.camera")
     parameters: dict[str, Any] = Field(default_factory=dict, description="checked by the node's own Config")
     remaps: dict[str, str] = Field(default_factory=dict, description="topic name in the node: topic name on the bus")
+    namespace: Identifier | Literal[""] = Field(
+        default="", description="its topics, but those of all nodes, begin with this name; its files lie in that folder"
+    )
     host: Identifier | None = Field(default=None, description="where it runs; null: on the host without `ssh`")
     restart: Literal["never", "on-failure", "always"] = Field(
         default="never", description="reaction to its end: none; a restart after a failure; a restart in any case"
@@ -106,6 +109,15 @@ class NodeSettings(_Checked):
     )
 
 
+class IncludedFile(_Checked):
+    """Another launch file, whose nodes get a namespace and names that begin with it."""
+
+    launch: str = Field(description="name of the launch file")
+    overlays: list[str] | None = Field(default=None, description="overlays applied to it; null: its default overlays")
+    robot: str | None = Field(default=None, description="as `--robot`: folder of the robot's description")
+    without: list[Identifier] = Field(default_factory=list, description="nodes of it that are left out")
+
+
 class NeededFile(_Checked):
     """A file that a person makes before the first run. `{node.parameter}` stands for the value of a parameter."""
 
@@ -121,6 +133,9 @@ class LaunchFile(_Checked):
     bus: BusSettings = Field(default=BusSettings(), description="clock and lockstep")
     hosts: dict[Identifier, HostSettings] = Field(
         default_factory=dict, description="computers of the run by their names, one of them without `ssh`"
+    )
+    include: dict[Identifier, IncludedFile] = Field(
+        default_factory=dict, description="namespace: a launch file of which all nodes run in it"
     )
     nodes: dict[Identifier, NodeSettings] = Field(min_length=1, description="name of the node: how it runs")
     default_overlays: list[str] = Field(default_factory=list, description="overlays applied without --with")
@@ -140,9 +155,17 @@ class LaunchFile(_Checked):
     after_run: Module | None = Field(
         default=None, description="module called with the run folder when all nodes have ended"
     )
+    after_run_of: dict[Identifier, Module] = Field(
+        default_factory=dict, description="namespace: module called with the folder of its nodes after the run"
+    )
     time_limit_s: Annotated[float, Field(gt=0.0)] | None = Field(
         default=None, description="wall-clock limit of the run"
     )
+
+    @property
+    def namespaces(self) -> tuple[str, ...]:
+        """Those that nodes are in, in the order of the file."""
+        return tuple(dict.fromkeys(node.namespace for node in self.nodes.values() if node.namespace))
 
 
 def editor_schema(kind: str) -> dict[str, Any]:

@@ -158,7 +158,7 @@ def node_process(
     run_folder.starts[name] += 1
     start = {START_VARIABLE: str(run_folder.starts[name])}
     process = SupervisedProcess(
-        [sys.executable, "-P", "-m", settings.module, "--config", str(run_folder.config(name))],
+        [sys.executable, "-P", "-m", settings.module, "--config", str(run_folder.config(name, settings.namespace))],
         folder=workspace.root,
         environment=node_environment(os.environ, workspace) | start,
         guard=guard,

@@ -27,7 +27,6 @@ class RunFolder:
 
     def __init__(self, path: Path) -> None:
         self.path, self.begun_ns = path, time.monotonic_ns()
-        self.nodes = path / "nodes"
         self.logs = path / "logs"
         self.starts = Counter[str]()
 
@@ -46,7 +45,6 @@ class RunFolder:
             except FileExistsError:
                 continue
             folder = cls(path)
-            folder.nodes.mkdir()
             folder.logs.mkdir()
             _point_latest(runs, path)
             return folder
@@ -56,9 +54,14 @@ class RunFolder:
         """File with the node's standard output and standard error."""
         return self.logs / f"{checked_name(node, 'node')}.log"
 
-    def config(self, node: str) -> Path:
-        """File that the node gets as `--config`."""
-        return self.nodes / f"{checked_name(node, 'node')}.yaml"
+    def of_namespace(self, namespace: str) -> Path:
+        """Folder of the files of the nodes in a namespace: as that of a run that they would have for themselves."""
+        return self.path / checked_name(namespace, "namespace") if namespace else self.path
+
+    def config(self, node: str, namespace: str = "") -> Path:
+        """File that the node gets as `--config`; in the folder of its namespace it has its name there."""
+        name = node.removeprefix(f"{namespace}_") if namespace else node
+        return self.of_namespace(namespace) / "nodes" / f"{checked_name(name, 'node')}.yaml"
 
     @property
     def events(self) -> Path:
@@ -96,7 +99,11 @@ class RunFolder:
                 bus["members"] = [other for other, its in launch.file.nodes.items() if its.lockstep and other != clock]
             if node.truth:
                 bus["truth_folder"] = str(truth_folder)
-            write_node_file(self.config(name), name, node, bus, self.path)
+            if launch.file.namespaces:
+                bus["namespaces"] = list(launch.file.namespaces)
+            file = self.config(name, node.namespace)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            write_node_file(file, name, node, bus, self.of_namespace(node.namespace))
 
     def write_run(self, facts: dict[str, Any]) -> None:
         """Writes `run.yaml`: facts of the run and, once it has ended, its outcome."""
@@ -117,11 +124,13 @@ def write_node_file(path: Path, name: str, node: NodeSettings, bus: dict[str, An
         path: Of the file.
         name: Of the node.
         node: Its settings in the launch file.
-        bus: Its view of the bus, without its remaps.
+        bus: Its view of the bus, without its remaps and its namespace.
         run_folder: Where it may write files.
     """
     if node.remaps:
         bus = bus | {"remaps": dict(node.remaps)}
+    if node.namespace:
+        bus = bus | {"namespace": node.namespace}
     _write(path, {"node": name, "bus": bus, "parameters": node.parameters, "run_folder": str(run_folder)})
 
 

@@ -8,7 +8,7 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -17,6 +17,7 @@ from typing import Any, Protocol, Self
 from paramove.bus import BusSettings, Exchange, topics
 from paramove.documents import exit_codes, printable
 from paramove.msgs.node_status_pb2 import NodeStatus
+from paramove.msgs.rule_pb2 import Speech
 from paramove.supervision import by_hand
 from paramove.supervision.control import ControlServer
 from paramove.supervision.environment import node_environment
@@ -33,6 +34,7 @@ from paramove.workspace import Workspace
 
 _ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _SUSPENDS = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
+STORIES = (topics.SPEECH, topics.APPLICATION_STAGE)
 POLL_PERIOD_S = 0.05
 """Longest wait between two reads of the bus; the end of a process is noticed at once."""
 
@@ -104,17 +106,18 @@ class Supervisor:
             name: SupervisedNode(name, node, self._spawn_node, self._changed) for name, node in self._file.nodes.items()
         }
         self._bus_folder = bus_folder
-        self._stage: int | None = None
+        self._stages: dict[str, int] = {}
         self._ending = False
         self._stop_s = 0.0
 
     def run(self) -> Outcome:
-        """Starts, supervises and ends the nodes, then calls `after_run`.
+        """Starts, supervises and ends the nodes, then calls `after_run_of` and `after_run`.
 
-        An interrupted run is not judged: `after_run` is left out.
+        An interrupted run is not judged: they are left out.
         """
         self._bus = Exchange("supervisor", BusSettings(folder=self._bus_folder))
-        for topic in (topics.SPEECH, topics.APPLICATION_STAGE, *map(topics.status, self.nodes)):
+        stories = BusSettings(folder=self._bus_folder, namespaces=self._file.namespaces).in_every_namespace(STORIES)
+        for topic in (*stories, *map(topics.status, self.nodes)):
             self._bus.subscribe(topic)
         control = ControlServer(self._bus_folder, self._by_hand)
         with (
@@ -132,10 +135,18 @@ class Supervisor:
                 self._kill_all()
                 self._bus.close()
                 self._view.close()
-            if self._file.after_run and self._interrupts.first is None and outcome.code not in exit_codes.INTERRUPTED:
-                outcome = self._judge(self._file.after_run, outcome)
+            for module, folder in self._judges():
+                if self._interrupts.first is None and outcome.code not in exit_codes.INTERRUPTED:
+                    outcome = self._judge(module, folder, outcome)
             self._events.write("run_ends", sentence=outcome.reason, exit_code=outcome.code)
         return outcome
+
+    def _judges(self) -> Iterator[tuple[str, Path]]:
+        """Each module that is called after the run, and with which folder."""
+        for namespace, module in self._file.after_run_of.items():
+            yield module, self._folder.of_namespace(namespace)
+        if self._file.after_run:
+            yield self._file.after_run, self._folder.path
 
     def _by_hand(self, request: Request) -> Answer:
         return by_hand.answer(self.nodes, request, self._ending)
@@ -215,9 +226,10 @@ class Supervisor:
             if host.lost:
                 return Outcome(exit_codes.FAILURE, f"the connection to {name} is lost: {host.lost}")
         for node in self.nodes.values():
-            if node.state is State.FINISHED and node.settings.ends_run:
+            is_done = node.state is State.FINISHED and node.settings.ends_run
+            if is_done and self._are_done_elsewhere(node):
                 return Outcome(exit_codes.OK, f"{node.name} has finished")
-            if node.state in (State.GIVEN_UP, State.FINISHED) and node.settings.required:
+            if node.state in (State.GIVEN_UP, State.FINISHED) and node.settings.required and not is_done:
                 reason = f"{node.name} {node.detail}; the run cannot continue without it"
                 return Outcome(exit_codes.FAILURE, reason)
             if node.came_back and node.settings.restart_ends_run:
@@ -231,6 +243,14 @@ class Supervisor:
         if time.monotonic() > limit_s:
             return Outcome(exit_codes.TIME_LIMIT, f"not finished within {self._file.time_limit_s:g} s")
         return None
+
+    def _are_done_elsewhere(self, done: SupervisedNode) -> bool:
+        """Whether in each other namespace that has nodes that end the run one of them has finished, too."""
+        finished: dict[str, list[bool]] = {}
+        for node in self.nodes.values():
+            if node.settings.ends_run and node.settings.namespace != done.settings.namespace:
+                finished.setdefault(node.settings.namespace, []).append(node.state is State.FINISHED)
+        return all(map(any, finished.values()))
 
     def _ignore_suspension(self) -> None:
         if self._interrupts.suspended:
@@ -274,11 +294,11 @@ class Supervisor:
         for node in self.nodes.values():
             node.kill()
 
-    def _judge(self, module: str, outcome: Outcome) -> Outcome:
-        """Calls `after_run` with the run folder; its exit code decides whether a run without failure succeeds."""
+    def _judge(self, module: str, folder: Path, outcome: Outcome) -> Outcome:
+        """Calls a module with a folder; its exit code decides whether a run without failure succeeds."""
         options = ["--no-video"] if self._headless else []
         judge = SupervisedProcess(
-            [sys.executable, "-P", "-m", module, str(self._folder.path), *options],
+            [sys.executable, "-P", "-m", module, str(folder), *options],
             folder=self._workspace.root,
             environment=node_environment(os.environ, self._workspace),
             guard=self._guard,
@@ -315,11 +335,14 @@ class Supervisor:
             if received.topic.type is NodeStatus:
                 if message.node in self.nodes:
                     self.nodes[message.node].handle(message)
-            elif received.topic is topics.SPEECH:
-                self._view.story(f'robot: "{printable(message.text)}"')
-            elif message.stage != self._stage:
-                self._stage = message.stage
-                self._view.story(f"stage: {message.Stage.Name(message.stage).removeprefix('STAGE_').lower()}")
+                continue
+            namespace, _ = topics.split_name(received.topic.name)
+            who = f"{namespace} " if namespace else ""
+            if received.topic.type is Speech:
+                self._view.story(f'{who}robot: "{printable(message.text)}"')
+            elif message.stage != self._stages.get(namespace):
+                self._stages[namespace] = message.stage
+                self._view.story(f"{who}stage: {message.Stage.Name(message.stage).removeprefix('STAGE_').lower()}")
 
     def _show_log(self, node: SupervisedNode) -> None:
         path = self._folder.log(node.name)

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from fnmatch import fnmatchcase
+from pathlib import Path
 
-from paramove.bus import CLOCK, Topic, topics
+from paramove.bus import CLOCK, BusSettings, Topic, topics
 from paramove.documents import DocumentError, nearest, raise_any
 from paramove.supervision.distribution import on_bus, wrong_hosts
 from paramove.supervision.interfaces import Interface, InterfaceError, read_interface, source_of
 from paramove.supervision.launch_file import Launch
+from paramove.supervision.launch_schema import NodeSettings
 from paramove.supervision.parameters import wrong_parameters
 from paramove.workspace import Workspace
 
 
 def read_interfaces(launch: Launch, workspace: Workspace, *, may_import: bool = True) -> dict[str, Interface]:
-    """Interface of every node.
+    """Interface of every node; with the topics of each namespace where the node is for all.
 
     Args:
         launch: Its nodes. workspace: Where their modules are.
@@ -28,7 +31,8 @@ def read_interfaces(launch: Launch, workspace: Workspace, *, may_import: bool = 
     findings = []
     for name, node in launch.file.nodes.items():
         try:
-            interfaces[name] = read_interface(node.module, workspace, may_import=may_import)
+            interface = read_interface(node.module, workspace, may_import=may_import)
+            interfaces[name] = _in_namespaces(launch, node, interface)
         except InterfaceError as error:
             findings.append(launch.error(("nodes", name, "module"), str(error)))
     if launch.file.after_run is not None:
@@ -40,6 +44,15 @@ def read_interfaces(launch: Launch, workspace: Workspace, *, may_import: bool = 
         findings += wrong_parameters(launch, interfaces, workspace)
     raise_any(findings)
     return interfaces
+
+
+def _in_namespaces(launch: Launch, node: NodeSettings, interface: Interface) -> Interface:
+    """The interface with the topics that the node has in this launch file."""
+    if not interface.every_namespace:
+        return interface
+    view = BusSettings(folder=Path(), namespace=node.namespace, namespaces=launch.file.namespaces)
+    subscribes, publishes = map(view.in_every_namespace, (interface.subscribes, interface.publishes))
+    return replace(interface, subscribes=subscribes, publishes=publishes)
 
 
 def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
@@ -145,7 +158,7 @@ def _target_problem(topic: Topic, target: str) -> str:
         return f"{target!r} is not a name of a topic: parts of lower-case letters, digits and '_', joined by '/'"
     if topic.truth or target.startswith(("truth/", "status/")):
         return f"{topic.name} cannot become {target}: truth and status topics are not remapped"
-    known = {other.name: other for other in topics.TOPICS}.get(target, topic)
+    known = topics.known_by(target) or topic
     if known.type is not topic.type:
         return f"{topic.name} cannot become {target}: it carries {topic.type_name}, {target} {known.type_name}"
     return ""

@@ -221,8 +221,21 @@ def test_estop_believes_the_gate_alone(desk, monkeypatch, answer, code):
     (desk.data.parent / "paramove" / "default").mkdir(parents=True)
     fault = SafetyFault(code=PERSON_STOP, detail="stopped from the terminal by a person")
     state = None if answer is None else SafetyState(state=answer, faults=[fault])
-    monkeypatch.setattr("paramove.operator.stop_arm", lambda folder, source, timeout_s: state)
+    monkeypatch.setattr("paramove.operator.stop_arms", lambda folder, source, timeout_s: {"": state})
     done = CliRunner().invoke(build("arm"), ["arm", "estop"])
     assert done.exit_code == code
     assert ("hold, stopped from the terminal" in done.stdout) == (code == 0)
     assert ("no safety gate has answered within 1 s" in done.stderr) == (code == 69)
+
+
+def test_estop_names_the_arm_that_has_not_answered(desk, monkeypatch):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(desk.data.parent))
+    monkeypatch.delenv("PARAMOVE_DOMAIN", raising=False)
+    (desk.data.parent / "paramove" / "default").mkdir(parents=True)
+    fault = SafetyFault(code=PERSON_STOP, detail="stopped from the terminal by a person")
+    answers = {"left": SafetyState(state=SafetyState.STATE_HOLD, faults=[fault]), "right": None}
+    monkeypatch.setattr("paramove.operator.stop_arms", lambda folder, source, timeout_s: answers)
+    done = CliRunner().invoke(build("arm"), ["arm", "estop"])
+    assert done.exit_code == 69
+    assert "the safety gate of left has received it: hold" in done.stdout
+    assert "the safety gate of right has not answered" in done.stderr

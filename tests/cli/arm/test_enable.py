@@ -31,8 +31,9 @@ def words(tmp_path, monkeypatch):
     (tmp_path / "paramove" / "default").mkdir(parents=True)
     told = {"answer": "armed", "words": []}
 
-    def request_arming(folder, armed, timeout_s):
+    def request_arming(folder, armed, timeout_s, namespace):
         told["words"].append(armed)
+        told["namespace"] = namespace
         if told["answer"] == "taken":
             raise TopicTakenError("operator says operator/arm already")
         return ANSWERS[told["answer"]]
@@ -102,3 +103,24 @@ def test_what_has_no_terminal_arms_nothing_but_may_disarm(words, monkeypatch):
     assert "only a person at a terminal arms" in done.stderr
     words["answer"] = "disarmed"
     assert (said("disable").exit_code, words["words"]) == (0, [False])
+
+
+def test_where_several_arms_run_a_person_names_one(words, monkeypatch):
+    gates = {"left": None, "right": None}
+    monkeypatch.setattr("paramove.bus.inspection.gates", lambda folder: gates)
+    for name in ("enable", "disable"):
+        done = said(name, *(["--yes"] if name == "enable" else []))
+        assert (done.exit_code, words["words"]) == (2, [])
+        assert "which one? --namespace left or --namespace right" in done.stderr
+    done = said("enable", "--namespace", "lift", line="y\n")
+    assert (done.exit_code, words["words"]) == (2, [])
+    assert "no arm in the namespace 'lift'; did you mean 'left'?" in done.stderr
+    done = said("enable", "--namespace", "right", line="y\n")
+    assert (done.exit_code, words["words"], words["namespace"]) == (0, [True], "right")
+    assert "right: Is everybody out of the arm's reach" in done.stdout
+
+
+def test_the_only_arm_needs_no_name(words, monkeypatch):
+    monkeypatch.setattr("paramove.bus.inspection.gates", lambda folder: {"left": None})
+    assert said("enable", "--yes").exit_code == 0
+    assert words["namespace"] == "left"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
-from paramove.cli.bus_options import DomainOption, bus_folder
+from paramove.cli.bus_options import DomainOption, NamespaceOption, arm_in, bus_folder
 from paramove.cli.output import ended
 from paramove.documents import exit_codes, printable
 from paramove.supervision import QueuedOutput
@@ -31,6 +31,7 @@ KEYS = "1-9 choose a joint, + and - move it, space stops, a arms, q ends"
 def jog(
     step_deg: Annotated[float, typer.Option("--step", min=0.1, max=10.0, metavar="DEG", help="of one key")] = 2.0,
     domain: DomainOption = None,
+    namespace: NamespaceOption = None,
 ) -> None:
     """Move one joint of a running arm by small steps, through its driver and safety gate.
 
@@ -42,12 +43,13 @@ def jog(
     from paramove.bus import BusVisitor, TopicTakenError
 
     folder = bus_folder(domain)
+    arm = arm_in(folder, namespace)
     try:
         person = TerminalPerson()
         with (
             QueuedOutput() as output,  # after Ctrl-S, keys must still stop the arm
             BusVisitor(folder, "jog") as bus,
-            contextlib.closing(_Link(bus, folder, math.radians(step_deg), person.is_at_terminal)) as link,
+            contextlib.closing(_Link(bus, folder, arm, math.radians(step_deg), person.is_at_terminal)) as link,
             person.pressing() as pressed,
         ):
             link.wait_for_arm()
@@ -66,7 +68,7 @@ def jog(
 class _Link:
     """The bus as jogging needs it; by_person: a person presses the keys, and no program."""
 
-    def __init__(self, bus: BusVisitor, folder: Path, step: float, by_person: bool) -> None:
+    def __init__(self, bus: BusVisitor, folder: Path, namespace: str, step: float, by_person: bool) -> None:
         from paramove.bus import topics
         from paramove.operator import ArmingKey, Jogging
 
@@ -76,9 +78,10 @@ class _Link:
         self._arming_message, self._displayed, self._printed_message = "", "", ""
         self._received_s = time.monotonic()
         self._arms: Publisher | None = None
-        self._trajectories = bus.publisher(topics.ARM_TRAJECTORY)
+        self._namespace = namespace
+        self._trajectories = bus.publisher(topics.topic_in(namespace, topics.ARM_TRAJECTORY))
         received = (topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
-        self._subscribers = [bus.subscriber(topic) for topic in received]
+        self._subscribers = [bus.subscriber(topics.topic_in(namespace, topic)) for topic in received]
 
     def close(self) -> None:
         """Ends the line that is rewritten."""
@@ -99,7 +102,7 @@ class _Link:
     def press(self, key: str) -> None:
         """Handles a key."""
         from paramove.bus import publish_now
-        from paramove.operator import TERMINAL, stop_arm
+        from paramove.operator import TERMINAL, stop_arms
 
         if key.isdecimal():
             self.jogging.choose(int(key) - 1)
@@ -112,7 +115,8 @@ class _Link:
             self._printed_message = ""  # the reason why it is not armed is printed again
         elif key == " ":
             self._arming.cancel()
-            if answer := stop_arm(self._folder, TERMINAL, STOP_S):
+            answer = stop_arms(self._folder, TERMINAL, STOP_S).get(self._namespace)
+            if answer is not None:
                 self._arming.stopped(answer)
             self.jogging.detail = "stopped" if answer else "no answer: use the switch of the motors' power"
 
@@ -172,7 +176,7 @@ class _Link:
         from paramove.operator import TERMINAL
 
         try:
-            self._arms = self._arms or self._bus.publisher(topics.OPERATOR_ARM)
+            self._arms = self._arms or self._bus.publisher(topics.topic_in(self._namespace, topics.OPERATOR_ARM))
         except TopicTakenError as error:
             self._arming.reject(f"{error}, and only one program may arm an arm")
             return

@@ -11,7 +11,7 @@ from .bus.bench import BusBench as BusBench
 from .bus.bench import bench_bus as bench_bus
 from .bus.bench import latency_timer_ms as latency_timer_ms
 from .bus.bench import slow_timer as slow_timer
-from .bus.clock import PACING_SOCKET as PACING_SOCKET
+from .bus.clock import pacing_socket as pacing_socket
 from .bus.packets import Instruction as Instruction
 from .bus.packets import Packet as Packet
 from .bus.packets import encoded as encoded

@@ -16,7 +16,7 @@ from paramove.robots.dynamixel.arm.servo_arm import Timeouts
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
-from paramove.robots.dynamixel.bus.clock import PACING_SOCKET, Clock, EmulatorClock
+from paramove.robots.dynamixel.bus.clock import Clock, EmulatorClock
 from paramove.robots.dynamixel.bus.serial_adapters import SerialAdapter
 from paramove.robots.dynamixel.bus.servo_models import ServoModel, model_named
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
@@ -83,7 +83,7 @@ class ServoArmSetup(OldNames):
         self,
         run_folder: Path,
         launch: ThisLaunch | None = None,
-        paced_in: Path | None = None,
+        paced_by: Path | None = None,
         checks_in_slices: bool = False,
     ) -> DrivenArm:
         """The arm, not yet driven.
@@ -91,7 +91,7 @@ class ServoArmSetup(OldNames):
         Args:
             run_folder: That relative names start from.
             launch: That may emulate the servos; None: none does.
-            paced_in: The bus folder, with the control socket of emulated servos that this loop paces, in lockstep.
+            paced_by: The control socket of emulated servos that this loop paces, in lockstep.
             checks_in_slices: See `ArmDriver`; somebody has to call `DrivenArm.check_on`.
 
         Raises:
@@ -102,9 +102,9 @@ class ServoArmSetup(OldNames):
         reason = (launch or ThisLaunch()).why_not_servos(run_folder / self.port)
         emulated = None if reason else self.emulated
         timeouts = self.timeouts if emulated is None else emulated.timeouts
-        if paced_in is not None and emulated is None:
+        if paced_by is not None and emulated is None:
             raise InputError(f"lockstep needs servos that this launch emulates: {reason or 'no `emulated` is given'}")
-        pace = None if paced_in is None else EmulatorClock(paced_in / PACING_SOCKET)
+        pace = None if paced_by is None else EmulatorClock(paced_by)
         port = servo_port(description, str(run_folder / self.port), timeouts.read_s, pace)
         calibration = None
         if self.calibration is not None:

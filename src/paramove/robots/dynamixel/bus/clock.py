@@ -7,10 +7,13 @@ import time
 from pathlib import Path
 from typing import Protocol
 
-PACING_SOCKET = "servo_time"
-"""Of the emulated servos of a run in lockstep: their control socket in its bus folder, whose path is short enough."""
 REPLY_TIMEOUT_S = 10.0
 """A world that is large, on a busy machine, needs tenths of a second."""
+
+
+def pacing_socket(bus_folder: Path, namespace: str = "") -> Path:
+    """Control socket of the emulated servos of a run in lockstep: in its bus folder, whose path is short enough."""
+    return bus_folder / ".".join(filter(None, (namespace, "servo_time")))
 
 
 class ClockLostError(OSError):
