@@ -2,7 +2,7 @@
 
 Subscribes  camera/image, objects/tracked, gestures, calibration/plane, rules, application/stage, speech,
             relocation/goal, relocation/status, arm/joint_states, arm/safety, action/outline, action/estimate,
-            every node's status
+            every node's status; in all namespaces
 Publishes   operator/stop   StopRequest   when a person presses stop
 """
 
@@ -32,7 +32,11 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, or a person's stop has brought the arm to rest."""
     robot = None if config.robot is None else RobotDescription.load(config.robot)
-    picture = LivePicture(robot, config.title, config.surface, config.texts, begun_ns=bus.settings.begun_ns)
+    settings = bus.settings
+    has_arms = bool(settings.namespaces)
+    picture = LivePicture(
+        robot, config.title, config.surface, config.texts, begun_ns=settings.begun_ns, has_arms=has_arms
+    )
     with PageServer(bus.run_folder, config.port) as page:
         button = StopButton(page.was_pressed, lambda request: bus.publish(topics.OPERATOR_STOP, request))
         bus.when_readable(page.pressed, lambda: button.look(bus.now_ns))
@@ -52,4 +56,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, SUBSCRIBES, PUBLISHES, Config, visitor=True)
+    main(run, SUBSCRIBES, PUBLISHES, Config, visitor=True, every_namespace=True)

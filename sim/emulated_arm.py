@@ -22,7 +22,7 @@ from dynamixel_emulator import (
     MujocoMechanics,
     WireFaults,
 )
-from paramove.documents import InputError
+from paramove.documents import Floats, InputError
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.robots import RobotDescription
 
@@ -43,6 +43,8 @@ class EmulatedArm:
         servo_rules_only: Whether the checker reports only packets that the servos themselves reject.
         paced: Whether time stands still until the emulator's `run_to`.
         advance: Advances a given world by a step.
+        prefix: Of the names of the arm's joints and sites in a given world. With one, the truth is in the frame of the
+            arm's base, which stands somewhere in the world.
     """
 
     def __init__(
@@ -58,16 +60,18 @@ class EmulatedArm:
         *,
         paced: bool = False,
         advance: Callable[[], None] | None = None,
+        prefix: str = "",
     ) -> None:
-        self._paced = paced
-        pose = dict(zip(robot.joint_names, robot.base_pose.tolist(), strict=True))
+        self._paced, self._prefix = paced, prefix
+        self._joint_names = [prefix + name for name in robot.joint_names]
+        pose = dict(zip(self._joint_names, robot.base_pose.tolist(), strict=True))
         for name, degrees in (posture_deg or {}).items():
-            pose[robot.joint_names[robot.index(name)]] = float(np.deg2rad(degrees))
+            pose[self._joint_names[robot.index(name)]] = float(np.deg2rad(degrees))
         units = robot.units
         joints = [
             DrivenJoint(name, counts, zero)
             for name, counts, zero in zip(
-                robot.joint_names, units.counts_per_rad.tolist(), units.zero_counts.tolist(), strict=True
+                self._joint_names, units.counts_per_rad.tolist(), units.zero_counts.tolist(), strict=True
             )
         ]
         self.robot = robot
@@ -122,16 +126,33 @@ class EmulatedArm:
     def truth(self, now_ns: int) -> TruthState:
         """True state of the world: joints in the order of the description, the end effector, and free objects."""
         with self.emulator.lock:
-            data = self.mechanics.data
-            message = TruthState(time_ns=now_ns, joint_positions=self.mechanics.angles(self.robot.joint_names))
-            if self.robot.chain is not None:
-                message.gripper.extend(data.site(self.robot.chain.sites.end_effector).xpos.tolist())
-            for name in self._objects:
-                x, y, z = data.body(name).xpos.tolist()
-                message.objects.add(
-                    name=name, x=x, y=y, z=z, quaternion_xyzw=data.body(name).xquat[[1, 2, 3, 0]].tolist()
-                )
+            return self.truth_in_still_world(now_ns)
+
+    def truth_in_still_world(self, now_ns: int) -> TruthState:
+        """The same, for a caller that keeps the world still meanwhile."""
+        data = self.mechanics.data
+        message = TruthState(time_ns=now_ns, joint_positions=self.mechanics.angles(self._joint_names))
+        rotation, origin = self._frame()
+        turn, quaternion = np.empty(4), np.empty(4)
+        mujoco.mju_mat2Quat(turn, rotation.ravel())
+        if self.robot.chain is not None:
+            end_effector = data.site(self._prefix + self.robot.chain.sites.end_effector)
+            message.gripper.extend((rotation @ end_effector.xpos + origin).tolist())
+        for name in self._objects:
+            body = data.body(name)
+            x, y, z = (rotation @ body.xpos + origin).tolist()
+            mujoco.mju_mulQuat(quaternion, turn, body.xquat)
+            message.objects.add(name=name, x=x, y=y, z=z, quaternion_xyzw=quaternion[[1, 2, 3, 0]].tolist())
         return message
+
+    def _frame(self) -> tuple[Floats, Floats]:
+        """Rotation [3, 3] and origin [3], m, of the world in the frame of the truth."""
+        if not self._prefix:
+            return np.eye(3), np.zeros(3)
+        assert self.robot.chain is not None
+        base = self.mechanics.data.site(self._prefix + self.robot.chain.sites.base)
+        rotation = base.xmat.reshape(3, 3).T
+        return rotation, -rotation @ base.xpos
 
 
 @contextlib.contextmanager

@@ -6,7 +6,7 @@ Subscribes  truth/layout   TruthLayout         once, latched   world
             truth/view     foxglove.RawImage   15 Hz           if the simulator renders it
 
 Writes `truth.mcap` (the view as JPEG) into the run folder and, with a verdict, `truth.json`, renewed every few seconds.
-When its process is started again it goes on in `truth.2.mcap`, ….
+When its process is started again it goes on in `truth.2.mcap`, …. Outside of namespaces it records the truth of each.
 """
 
 from __future__ import annotations
@@ -61,9 +61,9 @@ def run(bus: Bus, config: Config) -> None:
         if judge is not None:
             ending.callback(judge.write)
         recording.tell(detail)
-        for event in bus.events(*SUBSCRIBES, tick=True):
+        for event in bus.events(tick=True):
             if isinstance(event, Received):
-                view = event.topic is topics.TRUTH_VIEW
+                view = event.topic.type is RawImage
                 recording.keep(event, compressed(event.message, config.jpeg_quality) if view else None)
                 detail = (judge.handle(event) if judge is not None else "") or detail
             recording.tell(detail)
@@ -145,4 +145,4 @@ def compressed(image: RawImage, jpeg_quality: int) -> CompressedImage:
 
 
 if __name__ == "__main__":
-    main(run, SUBSCRIBES, PUBLISHES, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config, every_namespace=True)

@@ -70,7 +70,7 @@ class MujocoMechanics:
             RuntimeError: The simulation became unstable; the message names MuJoCo's warning.
         """
         self.data.qfrc_applied[self._dof] = 0.0
-        self.model.dof_damping[:] = self._model_damping
+        self.model.dof_damping[self._dof] = self._model_damping[self._dof]  # others may be those of other servos
         for dof, gear, effort, is_blocked in zip(self._dof, self._gear, efforts, blocked, strict=True):
             self.data.qfrc_applied[dof] += gear * effort.torque
             self.model.dof_damping[dof] += gear * gear * effort.damping + (BLOCKED_DAMPING if is_blocked else 0.0)

@@ -177,6 +177,37 @@ def test_a_run_without_a_robot_has_picture_and_processes(run: Run, browser: Brow
     expect_clean(browser)
 
 
+def test_two_arms_have_a_row_each_and_one_stop(run: Run, browser: Browser) -> None:
+    run.picture = LivePicture(None, "Hand over", SurfaceParameters(), has_arms=True, wall_s=lambda: 0.0)
+    gates = {name: topics.topic_in(name, topics.ARM_SAFETY) for name in ("left", "right")}
+    goal = scene.goal()
+    run.publish(
+        (gates["left"], scene.safety(SafetyState.STATE_ARMED)),
+        (gates["right"], scene.safety(SafetyState.STATE_HOLD, ("jump", "joint2 jumped"))),
+        (topics.topic_in("left", topics.RELOCATION_GOAL), goal),
+        (topics.topic_in("left", topics.SPEECH), Speech(text="I bring the red one")),
+    )
+    browser.open(run.page.link)
+    rows = (
+        "[...document.querySelectorAll('#arms tr')].map((r) => [...r.cells].map((c) => c.textContent).join('|')).join()"
+    )
+    shown = browser.until(rows, "the arms are shown")
+    assert shown == "left|armed|relocate green, requested, → 13.1, 1.8 cm|I bring the red one,right|hold|nothing yet|"
+    visible = "[...document.querySelectorAll('.card, #stop, #gate')].filter((e) => e.checkVisibility())"
+    assert "card arms" in browser.run(f"{visible}.map((e) => e.className || e.id).join()").split(",")
+    assert "right: joint2 jumped" in browser.text()
+    run.obeys = False
+    browser.click("#stop")
+    browser.wait(lambda: run.said, "the stop is published")
+    stop = scene.safety(SafetyState.STATE_HOLD, (PERSON_STOP, STOPPED))
+    run.publish((gates["left"], stop))
+    browser.run("1")
+    assert run.button.section()["progress"] == "asked", "one arm of two has answered"
+    run.publish((gates["right"], stop))
+    browser.until("document.getElementById('stop-word').textContent === 'STOPPED'", "both arms have stopped")
+    expect_clean(browser)
+
+
 def test_after_the_end_nothing_is_armed(run: Run, browser: Browser) -> None:
     opened(browser, run)
     run.page.say_farewell("all is done")

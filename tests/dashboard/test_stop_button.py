@@ -83,3 +83,25 @@ def test_a_page_that_was_restarted_knows_of_the_stop_by_the_gate() -> None:
     rig.gate(SafetyState.STATE_HOLD, PERSON_STOP, SECOND)
     assert rig.button.progress is Progress.STOPPED
     assert rig.said == []
+
+
+def test_a_stop_of_two_arms_is_over_when_both_are_at_rest() -> None:
+    rig = Rig()
+    left, right = (topics.topic_in(name, topics.ARM_SAFETY) for name in ("left", "right"))
+
+    def gate(topic: topics.Topic, state: SafetyState.State, code: str | None) -> None:
+        faults = [SafetyFault(code=code, detail=SENTENCE)] if code else []
+        rig.button.handle(Received(topic, SafetyState(state=state, faults=faults), SECOND, SECOND, 1))
+
+    gate(left, SafetyState.STATE_ARMED, None)
+    gate(right, SafetyState.STATE_ARMED, None)
+    rig.pressed = True
+    rig.button.look(SECOND)
+    gate(left, SafetyState.STATE_HOLD, PERSON_STOP)
+    rig.button.look(SECOND)
+    assert len(rig.said) == 2, "the right arm has not confirmed it"
+    assert rig.button.progress is Progress.REQUESTED
+    gate(right, SafetyState.STATE_STOPPING, PERSON_STOP)
+    assert rig.button.progress is Progress.STOPPING
+    gate(right, SafetyState.STATE_HOLD, PERSON_STOP)
+    assert rig.button.progress is Progress.STOPPED

@@ -14,10 +14,10 @@ from foxglove_schemas_protobuf.PointsAnnotation_pb2 import PointsAnnotation
 from pydantic import BaseModel, ConfigDict
 
 from paramove.bus import Bus, Received, nodes_in, topics
+from paramove.dashboard.arms import Arms, gate_section
 from paramove.dashboard.estimates import Estimates
 from paramove.dashboard.robot_shape import RobotShape, rounded
 from paramove.msgs.node_status_pb2 import NodeStatus
-from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.robots import AROUND_SERVO_ARM, RobotDescription, SurfaceParameters, WorkingSurface
 
 SIDE = "right"
@@ -95,6 +95,7 @@ class LivePicture:
         surface: The working surface and the objects on it, where they are not the robot's.
         texts: Words of the application.
         begun_ns: When the run began, by the bus clock.
+        has_arms: Whether arms are in namespaces.
         wall_s: Monotonic wall clock, for the age of the nodes' statuses.
     """
 
@@ -106,6 +107,7 @@ class LivePicture:
         texts: Texts | None = None,
         *,
         begun_ns: int = 0,
+        has_arms: bool = False,
         wall_s: Callable[[], float] = time.monotonic,
     ) -> None:
         drawn = None if robot is None else surface.of(robot, SIDE)
@@ -117,11 +119,13 @@ class LivePicture:
         self._begun_ns = begun_ns
         self._given: dict[str, Any] = {}
         self._safety: dict[str, Any] = {}
+        self._arms = Arms()
         self._arm: dict[str, Any] = {}
         self._image: bytes | None = None
         texts = texts or Texts()
         origin = "the right shoulder" if robot is None or robot.chain is None else "the arm's base"
-        self._page = {"title": title, "robot": robot is not None, "origin": origin, **texts.model_dump()}
+        has_robot = robot is not None or has_arms
+        self._page = {"title": title, "robot": has_robot, "origin": origin, **texts.model_dump()}
         estimates = self._estimates
         self._handlers: dict[str, Callable[[Any, float], None]] = {
             topics.APPLICATION_STAGE.name: estimates.on_stage,
@@ -137,7 +141,10 @@ class LivePicture:
 
     def handle(self, received: Received) -> None:
         """Handles one message of any topic that the page uses."""
-        if received.topic.name in self._handlers:
+        namespace, name = topics.split_name(received.topic.name)
+        if namespace:
+            self._arms.handle(namespace, name, received)
+        elif received.topic.name in self._handlers:
             self._handlers[received.topic.name](received.message, received.captured_ns * 1e-9)
         elif received.topic.name == topics.CAMERA_IMAGE.name:
             self._image = bytes(received.message.data)
@@ -146,7 +153,7 @@ class LivePicture:
         elif received.topic.name == topics.ARM_JOINT_STATES.name and self._robot is not None:
             self._robot.joints = received.message
         elif received.topic.name == topics.ARM_SAFETY.name:
-            self._safety = _safety(received.message)
+            self._safety = gate_section(received.message)
         elif received.topic.type is NodeStatus:
             self._nodes.handle(received.message, self._wall_s())
 
@@ -163,7 +170,8 @@ class LivePicture:
             **self._estimates.sections(now_ns * 1e-9),
             **({} if self._robot is None else self._robot.sections()),
             "arm": self._arm,
-            "safety": self._safety,
+            "safety": self._safety or self._arms.gate(),
+            "arms": self._arms.section(now_ns * 1e-9),
             "stop": stop,
             "nodes": self._nodes.section(self._wall_s()),
         }
@@ -207,14 +215,6 @@ def _sites_of(robot: RobotDescription) -> tuple[str, str]:
         return robot.chain.sites.base, robot.chain.sites.end_effector
     sites = robot.arm(SIDE).sites
     return sites.shoulder, sites.gripper
-
-
-def _safety(message: SafetyState) -> dict[str, Any]:
-    return {
-        "state": SafetyState.State.Name(message.state).removeprefix("STATE_").lower(),
-        "faults": [{"joint": fault.joint, "sentence": fault.detail} for fault in message.faults],
-        "refused": message.rejected_trajectories,
-    }
 
 
 def _drawn_arm(message: ImageAnnotations) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import enum
 from collections.abc import Callable
 from typing import Any
 
-from paramove.bus import Received, topics
+from paramove.bus import Received
 from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
 from paramove.safety import PERSON_STOP
 
@@ -40,6 +40,7 @@ class StopButton:
         self._was_pressed = was_pressed
         self._publish = publish
         self._requested_ns = 0
+        self._gates: dict[str, SafetyState] = {}
         self._stopped_ns: int | None = None
 
     def look(self, now_ns: int) -> None:
@@ -52,18 +53,18 @@ class StopButton:
             self._publish(request)
 
     def handle(self, received: Received) -> None:
-        """Handles the gate's states: whether it has received the stop, and whether the arm rests.
+        """Handles the gates' states: whether each has received the stop, and whether its arm rests.
 
         A stop from another page counts, too: this one may have been restarted in between.
         """
-        if received.topic.name != topics.ARM_SAFETY.name:
+        if received.topic.type is not SafetyState:
             return
-        safety: SafetyState = received.message
-        sentences = [fault.detail for fault in safety.faults if fault.code == PERSON_STOP]
-        if not sentences:
+        self._gates[received.topic.name] = received.message
+        stops = [[fault.detail for fault in gate.faults if fault.code == PERSON_STOP] for gate in self._gates.values()]
+        if not all(stops):
             return
-        self.detail = sentences[0]
-        if safety.state in (SafetyState.STATE_HOLD, SafetyState.STATE_ESTOP):
+        self.detail = stops[0][0]
+        if all(gate.state in (SafetyState.STATE_HOLD, SafetyState.STATE_ESTOP) for gate in self._gates.values()):
             self.progress = Progress.STOPPED
             self._stopped_ns = received.published_ns if self._stopped_ns is None else self._stopped_ns
         else:

@@ -1,6 +1,6 @@
 """Whether a process is an emulator that a launcher started, and runs the installed code.
 
-A node may serve a pseudo-terminal and pass on what it receives. Only two modules of the installed workspace emulate
+A node may serve a pseudo-terminal and pass on what it receives. Only three modules of the installed workspace emulate
 robots, so a process counts if the launcher itself started one of them, by the Python of this process, and if no file on
 PYTHONPATH replaces a module of it (by `-P` the working directory is not searched). This is read from the system
 (/proc), and is no defence against a user who changes the installed files, or a running process.
@@ -18,7 +18,7 @@ import psutil
 
 from paramove.workspace import Workspace
 
-MODULES = ("sim.dynamixel_emulator", "sim.simulator")
+MODULES = ("sim.dynamixel_emulator", "sim.shared_table", "sim.simulator")
 """That emulate a robot."""
 LAYERED = "sim"
 """The package whose modules a folder of the workspace may add to, or replace."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -83,8 +83,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _evaluate(options: argparse.Namespace, console: Console) -> tuple[bool, list[Path | None]]:
     folder = options.run_folder
-    states = _truth_in(folder)
+    states = truth_in(folder)
     results = results_of(_tasks_in(folder), states)
+    robot = robot_in(folder)
+    if robot is None:
+        return show_results(folder, "a servo arm", results, states, None, console)
+    from paramove.runs.servo_arm_film import FilmedArm, scene_of, write_film
+
+    description = RobotDescription.load(robot)
+
+    def make_film() -> Path | None:
+        return write_film(folder, description.name, scene_of(description), [FilmedArm(description, states)], console)
+
+    return show_results(folder, description.name, results, states, None if options.no_video else make_film, console)
+
+
+def show_results(
+    folder: Path,
+    name: str,
+    results: Sequence[TaskResult],
+    states: Sequence[TruthState],
+    make_film: Callable[[], Path | None] | None,
+    console: Console,
+) -> tuple[bool, list[Path | None]]:
+    """Prints results, writes `run.json`, the picture of the paths and the report; whether all is good, and the files.
+
+    Args:
+        folder: Of the run.
+        name: Of who did the tasks.
+        results: In the frame of the states.
+        states: Of the world.
+        make_film: Makes the film and returns its file; None: there is none.
+        console: Where it prints.
+    """
     good = sum(one.good for one in results)
     success = good == len(results) > 0
     content = {"success": success, "good": good, "tasks": [{**asdict(one), "good": one.good} for one in results]}
@@ -94,20 +125,16 @@ def _evaluate(options: argparse.Namespace, console: Console) -> tuple[bool, list
         what = f"{one.thing or 'hand'} to {_metres(one.wanted)}"
         mark = "" if one.good else "  <- too far"
         console.print(f"  {one.task:6} {what:40} {1e3 * one.error:5.1f} mm away{mark}", markup=False)
-    from paramove.runs.servo_arm_film import write_film
-
     picture = _draw(folder / "tasks.png", results, states)
-    robot = robot_in(folder)
-    video = None
-    if robot is not None and not options.no_video:
-        video = write_film(folder, RobotDescription.load(robot), states, console)
-    report = _write_report(folder, "a servo arm" if robot is None else robot.name, results, picture, video)
+    video = None if make_film is None else make_film()
+    report = _write_report(folder, name, results, picture, video)
     return success, [report, picture, video, numbers]
 
 
-def _truth_in(folder: Path) -> list[TruthState]:
+def truth_in(folder: Path, namespace: str = "") -> list[TruthState]:
+    """States of an arm and the things around it, in the recorded truth of a run; raises RunFolderError."""
     recording = PartedRecording(folder / "truth.mcap")
-    read = recording.read((topics.TRUTH_STATE.name,))
+    read = recording.read((topics.name_in(namespace, topics.TRUTH_STATE.name),))
     states = [one.message for one in read if len(one.message.gripper) == 3]
     if states:
         return states

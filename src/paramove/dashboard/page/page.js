@@ -91,6 +91,21 @@ const SHOW = {
     text($("stop-word"), { "not asked": "STOP", asked: "STOP …", stopping: "STOPPING", stopped: "STOPPED" }[content.progress] ?? "STOP");
     if (content.progress !== "not asked" && content.progress !== "asked") pressedAt = null;
   },
+  arms(content) {
+    $("arms").closest(".card").hidden = !content.length;
+    document.body.classList.toggle("with-arms", content.length > 0);
+    $("arms").replaceChildren(...content.map((arm) => {
+      const row = document.createElement("tr"), { kind, object, phase, state: reached, to } = arm.goal;
+      const what = [kind, object].filter(Boolean).join(" "), progress = arm.goal.ended ? reached : phase || reached;
+      cell(row, arm.name);
+      const gate = cell(row, arm.gate.state, "state");
+      gate.dataset.state = arm.gate.state;
+      gate.title = arm.gate.faults.map((fault) => fault.sentence).join("; ");
+      cell(row, [what, progress, to ? `→ ${cm(to)}` : ""].filter(Boolean).join(", ") || "nothing yet");
+      cell(row, arm.sentence).title = arm.sentence;
+      return row;
+    }));
+  },
   nodes(content) {
     $("nodes").closest(".card").hidden = !content.length;
     const body = $("nodes"), ok = content.filter((node) => node.state === "ready" && node.silent_s <= NO_STATUS_S).length;
@@ -139,7 +154,10 @@ async function take(data, from) {
   if (typeof data !== "string") { image = data; return; }
   handle(JSON.parse(data));
   if (!document.hidden) {
-    if (image) await camera.image(image);
+    if (image) {
+      document.body.classList.add("with-picture");
+      await camera.image(image);
+    }
     image = null;
     await new Promise((done) => { requestAnimationFrame(done); setTimeout(done, 1000); });
     draw();
