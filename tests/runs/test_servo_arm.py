@@ -16,7 +16,7 @@ from paramove.recording.parts import next_part
 from paramove.recording.writer import RecordingWriter
 from paramove.robots import RobotDescription
 from paramove.runs import servo_arm
-from paramove.runs.servo_arm_film import write_film
+from paramove.runs.servo_arm_film import FilmedArm, scene_of, write_film
 from tests.recording.small_disk import fill, small_disk
 
 TASKS = "parameters: {tasks: [{reach: [0.2, 0.0, 0.1]}, {pick: [0.1, 0.1, 0.02], place: [0.2, 0.1, 0.02]}]}\n"
@@ -113,7 +113,7 @@ def test_the_film_shows_the_recorded_states(tmp_path: Path) -> None:
     states = [TruthState(time_ns=round(t * 1e9), joint_positions=robot.base_pose + 0.5 * t) for t in (0.0, 0.1, 0.2)]
     for state in states:
         state.objects.add(name="red_cube", x=0.1, y=0.1, z=0.01, quaternion_xyzw=(0.0, 0.0, 0.0, 1.0))
-    path = write_film(tmp_path, robot, states, Console(quiet=True))
+    path = write_film(tmp_path, robot.name, scene_of(robot), [FilmedArm(robot, states)], Console(quiet=True))
     assert path is not None
     with av.open(str(path)) as film:
         pictures = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]

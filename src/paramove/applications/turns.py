@@ -60,7 +60,7 @@ class Turns:
         failures = [f"{arm}: {task.failure}" for arm, task in self._tasks.items() if task.failure]
         if failures:
             self.failure = "; ".join(failures)
-        elif all(task.finished for task in self._tasks.values()):
+        elif not self.finished and all(task.finished for task in self._tasks.values()):
             self._done += 1
             self.finished = self._done == len(self._turns)
             self._tasks = {} if self.finished else self._begun()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from paramove.msgs.truth_pb2 import TruthState
 from paramove.robots import RobotDescription
 from paramove.runs.video import FRAMES_PER_S, SIZE, TEXT, VideoWriter, label, paste
 
+LONGEST_S = 30.0
+"""Of a film."""
 FRONT = (0.704, 0.534, 0.283, 0.373)
 """Quaternion (w, x, y, z) of a camera before the table on the right that looks at its middle."""
 
@@ -49,7 +52,8 @@ def scene_of(robot: RobotDescription) -> mujoco.MjModel:
 def write_film(
     folder: Path, title: str, model: mujoco.MjModel, arms: Sequence[FilmedArm], console: Console
 ) -> Path | None:
-    """Writes `tasks.mp4`: a world in the recorded states, as fast as it was. None if nothing can be drawn.
+    """Writes `tasks.mp4`: a world in the recorded states, as fast as it was; a long run is shown so many times as fast
+    that it is over after `LONGEST_S`. None if nothing can be drawn.
 
     Args:
         folder: Where it is written.
@@ -63,7 +67,8 @@ def write_film(
     together = list(zip(*(arm.states for arm in arms), strict=False))  # one process published them all at each time
     times_s = 1e-9 * np.array([states[0].time_ns for states in together])
     rows = np.array([_qpos(model, arms, states) for states in together])
-    shown_s = np.arange(times_s[0], times_s[-1], 1.0 / FRAMES_PER_S)
+    speed = max(1, math.ceil((times_s[-1] - times_s[0]) / LONGEST_S))
+    shown_s = np.arange(times_s[0], times_s[-1], speed / FRAMES_PER_S)
     path = folder / "tasks.mp4"
     try:
         eye = Eye(model, *SIZE)
@@ -75,7 +80,8 @@ def write_film(
             data.qpos[:] = [np.interp(time_s, times_s, column) for column in rows.T]
             mujoco.mj_forward(model, data)
             picture = eye.look(data, "front").copy()
-            paste(picture, label(f"{title}   {time_s - times_s[0]:5.1f} s", 24, TEXT, bold=True), 18, 14, True)
+            clock = f"{time_s - times_s[0]:5.1f} s" + (f", {speed} times as fast" if speed > 1 else "")
+            paste(picture, label(f"{title}   {clock}", 24, TEXT, bold=True), 18, 14, True)
             writer.write(picture)
     return path
 

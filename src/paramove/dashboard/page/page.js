@@ -94,6 +94,8 @@ const SHOW = {
   arms(content) {
     $("arms").closest(".card").hidden = !content.length;
     document.body.classList.toggle("with-arms", content.length > 0);
+    const busy = content.find((arm) => arm.goal.kind && !arm.goal.ended) ?? content.find((arm) => arm.sentence);
+    if (busy && !state.words?.length) text($("sentence"), `${busy.name}: ${busy.sentence}`);
     $("arms").replaceChildren(...content.map((arm) => {
       const row = document.createElement("tr"), { kind, object, phase, state: reached, to } = arm.goal;
       const what = [kind, object].filter(Boolean).join(" "), progress = arm.goal.ended ? reached : phase || reached;
