@@ -16,6 +16,7 @@ MODULES = [
     "sim.simulator",
     "sim.judge",
     "sim.dynamixel_emulator",
+    "sim.shared_table",
 ]
 INTERFACES = {module.partition(".")[2]: read_interface(module, Workspace.at(ROOT)) for module in MODULES}
 

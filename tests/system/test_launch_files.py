@@ -11,15 +11,15 @@ from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 LAUNCH_FILES = sorted(path.stem for path in (ROOT / "launch").glob("*.yaml"))
-SIMULATED = {"dynamixel_arm": "emulated"}
-"""The overlay that stands for the hardware, where it is not `sim`."""
+SIMULATED = {"dynamixel_arm": ["emulated"], "hand_over": [], "two_arms": ["lockstep"]}
+"""The overlays that stand for the hardware, where they are not `sim`."""
 
 
 @pytest.mark.parametrize(
-    ("name", "overlay"), [(name, one) for name in LAUNCH_FILES for one in (SIMULATED.get(name, "sim"), "real")]
+    ("name", "overlays"), [(name, one) for name in LAUNCH_FILES for one in (SIMULATED.get(name, ["sim"]), ["real"])]
 )
-def test_nodes_fit_together(name, overlay):
-    launch = load(Workspace.at(ROOT), name, [overlay])
+def test_nodes_fit_together(name, overlays):
+    launch = load(Workspace.at(ROOT), name, overlays)
     application.check(launch, Workspace.at(ROOT))
 
 

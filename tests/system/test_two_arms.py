@@ -31,11 +31,11 @@ def reaching(times=1):
         yield from ("--set", f"{side}_reacher.tasks=[{steps}]")
 
 
-def published(launcher, name):
+def published(launcher, name, overlay):
     """What both arms published in a run in lockstep, by topic, and the joints that they really had."""
     launcher.folder = launcher.folder.parent / name
     launcher.folder.mkdir()
-    code, shown = launcher.run("two_arms", "--with", "lockstep", "--headless", *reaching())
+    code, shown = launcher.run("two_arms", "--with", overlay, "--headless", *reaching())
     assert code == 0, shown
     speech = read(launcher.latest / "recording.mcap", ("left/speech", "right/speech"))
     done_ns = max(one.message.captured.ToNanoseconds() for one in speech)  # then processes end as the machine lets them
@@ -51,9 +51,10 @@ def published(launcher, name):
     return messages
 
 
-def test_two_arms_in_lockstep_do_the_same_in_every_run(launcher, tmp_path):
+@pytest.mark.parametrize("overlay", ["lockstep", pytest.param("koch_lockstep", marks=pytest.mark.long)])
+def test_two_arms_in_lockstep_do_the_same_in_every_run(launcher, tmp_path, overlay):
     launcher.folder = tmp_path / "runs"
-    once, again = (published(launcher, name) for name in ("one", "two"))
+    once, again = (published(launcher, name, overlay) for name in ("one", "two"))
     for topic, messages in once.items():
         assert len(messages) > (50 if "joint" in topic or "truth" in topic else 0), topic
         assert messages == again[topic], topic
@@ -102,3 +103,21 @@ def test_what_happens_to_one_arm_neither_stops_nor_moves_the_other_and_a_stop_st
             assert "person_stop" in faults, side
         until(lambda: gate_of(run, "right") == SafetyState.STATE_HOLD, "the right arm is at rest")
         assert gate_of(run, "left") != SafetyState.STATE_ARMED
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("overlay", [(), ("--with", "koch")], ids=["Koch and OpenMANIPULATOR-X", "two Koch"])
+def test_two_arms_in_real_time_do_their_tasks(launcher, overlay):
+    code, shown = launcher.run("two_arms", *overlay, "--headless")
+    assert code == 0, shown
+    for side in ("left", "right"):
+        tasks = json.loads((launcher.latest / side / "run.json").read_text())["tasks"]
+        assert [one["good"] for one in tasks] == [True, True]
+
+
+@pytest.mark.long
+def test_two_arms_at_one_table_hand_over_what_belongs_to_the_other_side(launcher):
+    code, shown = launcher.run("hand_over", "--headless", timeout_s=600)
+    assert code == 0, shown
+    tasks = json.loads((launcher.latest / "run.json").read_text())["tasks"]
+    assert {one["thing"]: one["good"] for one in tasks} == {"red_cube": True, "blue_cube": True}
