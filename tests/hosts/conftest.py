@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.hosts import free_ports
 from paramove.bus import Bus, BusSettings, BusVisitor, Publisher, Subscriber, topics
-from paramove.bus.topics import Topic
+from paramove.bus.topics import Topic, split_name
 from paramove.hosts import HostKeys, Peer, Relay, RelaySettings
 
 
@@ -39,7 +39,7 @@ class TwoHosts:
         self._running: dict[str, contextlib.ExitStack] = {}
         for name, other in (("here", "there"), ("there", "here")):
             self.keys[name].trust(other, self.keys[other].own().public)
-            rows = [{one.name: one.name for one in crossing[side]} for side in (name, other)]
+            rows = [{one.name: split_name(one.name)[1] for one in crossing[side]} for side in (name, other)]
             peer = Peer(
                 address="127.0.0.1",
                 port=self.ports[other],

@@ -281,6 +281,23 @@ def test_what_persons_request_elsewhere_leaves_the_topic_to_those_here(two_hosts
     assert stopped.receive() is None
 
 
+def test_a_request_to_arm_from_elsewhere_is_for_the_arm_of_its_namespace(two_hosts):
+    requests = topics.topic_in("left", topics.OPERATOR_ARM)
+    hosts = two_hosts((requests, topics.topic_in("right", topics.OPERATOR_ARM)), real_time=True)
+    here, there = hosts.visitor("here"), hosts.visitor("there")
+    arms = here.publisher(requests)
+    away = topics.OPERATOR_ARM_AWAY
+    left, *others = (there.subscriber(topics.topic_in(name, away)) for name in ("left", "right", ""))
+    hosts.start()
+    hosts.until(lambda: not hosts.relays["there"].trouble, arms.serve)
+    now_ns = time.monotonic_ns()
+    arms.publish(ArmRequest(source="terminal", armed=True, by_person=True), now_ns, now_ns)
+    assert hosts.until(left.receive, arms.serve).message.armed
+    begun_s = time.monotonic()
+    hosts.until(lambda: time.monotonic() > begun_s + 0.3, arms.serve)
+    assert [one.receive() for one in others] == [None, None]
+
+
 def test_a_stop_overtakes_trajectories_on_their_way_to_another_host(two_hosts, monkeypatch):
     """All of it has left the one host before the other reads anything."""
     hosts = two_hosts((topics.ARM_TRAJECTORY, topics.OPERATOR_ESTOP), real_time=True)

@@ -126,3 +126,31 @@ def test_a_robot_and_its_driver_need_one_host(tmp_path):
     its = load(Workspace.here(), "rule_learning", ["sim", str(file)])
     with pytest.raises(DocumentError, match="wire/hoap3"):
         application.check(its, Workspace.here())
+
+
+TWO_ARMS = """
+hosts:
+  desk_pc: {address: 10.0.0.1}
+  robot_pc: {ssh: arm, address: 10.0.0.2}
+include: {left: {without: [recorder, judge]}}
+nodes: {left_arm_driver: {host: robot_pc}, left_dynamixel_emulator: {host: robot_pc}}
+"""
+
+
+def test_one_of_two_arms_may_be_on_another_host(tmp_path):
+    keys, file = HostKeys(tmp_path / "keys"), tmp_path / "two.yaml"
+    keys.trust("arm", "1" * 40)
+    file.write_text(TWO_ARMS)
+    its = load(Workspace.here(), "two_arms", [str(file)])
+    nodes = distributed(its, application.check(its, Workspace.here()), keys).file.nodes
+    gives = nodes["relay_robot_pc"].parameters["peers"]["desk_pc"]["gives"]
+    assert {name: gives[name] for name in ("left/arm/trajectory", "left/operator/arm", "operator/stop")} == {
+        "left/arm/trajectory": "arm/trajectory",
+        "left/operator/arm": "operator/arm",
+        "operator/stop": "operator/stop",
+    }
+    assert [name for name in gives if name.startswith("right/")] == ["right/arm/safety"], "which crosses to every host"
+    wants = nodes["relay_robot_pc"].parameters["peers"]["desk_pc"]["wants"]
+    assert "left/arm/safety" in wants
+    assert 0.0 < nodes["left_arm_driver"].parameters["link_timeout_s"] <= 0.1
+    assert "link_timeout_s" not in nodes["right_arm_driver"].parameters

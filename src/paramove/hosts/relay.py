@@ -149,9 +149,9 @@ class Relay:
         self._latest: dict[tuple[str, str], tuple[int, int]] = {}
         self._link = LinkState(hosts=sorted(host for host, peer in settings.peers.items() if peer.commands))
         self._confirmed_ns = 0
-        for row in {row for peer in settings.peers.values() for row in peer.gives.values()} & topics.AWAY.keys():
-            away_topic = topics.AWAY[row]  # before the first request, which has no time to wait for subscribers
-            self._publisher(away_topic, away_topic.name)
+        for name, row in {item for peer in settings.peers.values() for item in peer.gives.items()}:
+            if row in topics.AWAY:  # before the first request, which has no time to wait for subscribers
+                self._publisher(topics.AWAY[row], _away_name(name, row))
         self._look_due_s = self._detail_due_s = 0.0
         self.detail = ""
         ends: list[Subscriber | Offer | Request | _Answers] = [*self._ends(), *self._offers]
@@ -324,7 +324,7 @@ class Relay:
             self._publisher(topic, name).forward(envelope._replace(flags=envelope.flags & ~FLAG_RING), payload)
         elif message is not None and self._latest.get((host, name)) != (envelope.epoch, envelope.sequence):
             self._latest[host, name] = envelope.epoch, envelope.sequence  # a new link repeats the last one
-            self._publisher(away, away.name).publish(message, envelope.captured_ns, now_ns)
+            self._publisher(away, _away_name(name, topic.name)).publish(message, envelope.captured_ns, now_ns)
 
     def _publisher(self, topic: Topic, name: str) -> Publisher:
         if name not in self._publishers:
@@ -470,3 +470,9 @@ class _Answers:
             self._forget(node)
         self.foreign.close()
         self.socket.close()
+
+
+def _away_name(name: str, row: str) -> str:
+    """Name on the bus of what persons at other hosts request by the topic `name`, in the namespace of that arm."""
+    namespace, local = topics.split_name(name)
+    return topics.name_in(namespace if local == row else "", topics.AWAY[row].name)
