@@ -52,7 +52,10 @@ def offered(monkeypatch, capsys):
     ("line", "expected"),
     [
         ("paramove la", {"launch"}),
-        ("paramove launch ", {"dynamixel_arm", "pointing", "relocate_by_pointing", "rule_learning"}),
+        (
+            "paramove launch ",
+            {"dynamixel_arm", "hand_over", "pointing", "relocate_by_pointing", "rule_learning", "two_arms"},
+        ),
         ("paramove launch rule_learning --with re", {"real", "real_time", "rehearsal"}),
         ("paramove launch pointing --with rep", {"replay"}),
         ("paramove launch rule_learning --set camera.w", {"camera.width="}),
@@ -105,7 +108,7 @@ def test_half_written_files_offer_nothing_and_say_nothing(tmp_path, text, offere
     (tmp_path / "launch").mkdir()
     (tmp_path / "launch" / "half.yaml").write_text(text)
     assert offered("paramove launch half --set x", cwd=tmp_path) == []
-    assert offered("paramove launch ha", cwd=tmp_path) == ["half"]
+    assert offered("paramove launch hal", cwd=tmp_path) == ["half"]
 
 
 def test_folders_of_runs_are_offered(tmp_path, offered):

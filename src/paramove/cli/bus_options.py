@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from paramove.bus import Topic, inspection, running_folder, topics
+from paramove.bus import Topic, running_folder, topics
 from paramove.cli import completions
 from paramove.cli.output import aligned, ended
 from paramove.documents import InputError, exit_codes, nearest
@@ -59,6 +59,8 @@ def with_old_keys(row: dict[str, Any]) -> dict[str, Any]:
 
 def arm_in(folder: Path, namespace: str | None) -> str:
     """Namespace of the arm that a person means; ends the command if several run and none is named, or not that one."""
+    from paramove.bus import inspection  # not before: it loads ZeroMQ, and a stop waits for nothing
+
     gates = inspection.gates(folder)
     if namespace is None:
         if len(gates) > 1:
