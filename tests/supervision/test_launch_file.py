@@ -376,6 +376,12 @@ def test_other_keys_of_an_included_file_name_its_nodes_and_topics(two_arms):
     assert file.needs["right_model"].made_by == "paramove train {right_driver.robot}"
 
 
+def test_a_file_that_judges_the_whole_run_takes_the_place_of_those_that_judge_its_parts(two_arms):
+    (two_arms / "two.yaml").write_text(f"after_run: paramove.runs.hand_over\n{TWO}")
+    file = load(two_arms, "two").file
+    assert (file.after_run, file.after_run_of) == ("paramove.runs.hand_over", {})
+
+
 def test_settings_name_nodes_by_their_full_names(two_arms):
     assert load(two_arms, "two", None, ["left_driver.robot=c"]).file.nodes["left_driver"].parameters["robot"] == "c"
 

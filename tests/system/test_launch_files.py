@@ -11,7 +11,7 @@ from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 LAUNCH_FILES = sorted(path.stem for path in (ROOT / "launch").glob("*.yaml"))
-SIMULATED = {"dynamixel_arm": ["emulated"], "hand_over": [], "two_arms": ["lockstep"]}
+SIMULATED = {"dynamixel_arm": ["emulated"], "hand_over": ["emulated"], "two_arms": ["lockstep"]}
 """The overlays that stand for the hardware, where they are not `sim`."""
 
 

@@ -84,6 +84,8 @@ class _Included:
 def with_included(document: Document, read: Callable[[str, IncludedFile], tuple[LaunchFile, Document]]) -> Document:
     """The launch file with all nodes of the files that its key `include` names, below its own content.
 
+    Its own `after_run` takes the place of theirs.
+
     Args:
         document: The file with its overlays.
         read: Reads an included file by its namespace and what the key says of it, with its overlays; checked.
@@ -107,6 +109,8 @@ def with_included(document: Document, read: Callable[[str, IncludedFile], tuple[
     for one in included:
         for key in LISTS:
             entries[key] += one.data.pop(key)
+        if "after_run" in own:  # which judges the whole run
+            one.data.pop("after_run_of", None)
         result = result.overlaid(one.as_document())
     positions = dict(document.positions)
     for key in LISTS:
