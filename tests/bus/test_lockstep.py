@@ -14,7 +14,9 @@ import pytest
 from paramove.bus import topics
 from paramove.bus.barrier import LockstepBarrier
 from paramove.bus.bus import Bus
+from paramove.bus.lockstep import from_marks
 from paramove.bus.settings import BusSettings
+from paramove.msgs.clock_pb2 import TickDone
 from paramove.msgs.rule_pb2 import Speech
 from paramove.msgs.tracked_objects_pb2 import TrackedObjects
 from tests.bus.conftest import Wait
@@ -95,6 +97,21 @@ def test_the_same_run_twice_however_slow_the_members_are(members: Members, tmp_p
     # Node to node takes one tick; the simulator's own messages none.
     assert gestures[0] == f'gestures 1 {PERIOD_NS} object: "1000" '
     assert lines.index(gestures[0]) > lines.index(f"tick 1 {PERIOD_NS}")
+
+
+def test_what_a_member_published_before_it_left_counts_for_one_more_tick(folder: Path) -> None:
+    with _simulator(folder, ()) as bus:
+        barrier = LockstepBarrier(bus)
+        marks = from_marks({"speech": (7, 3), "lockstep/b": (os.getpid(), 0)})
+        assert barrier._take(TickDone(node="b", pid=os.getpid(), kind=TickDone.KIND_JOIN, published=marks))
+        barrier._admit()
+        assert barrier._take(TickDone(node="b", pid=os.getpid(), kind=TickDone.KIND_LEAVE, published=marks))
+        assert barrier.members == frozenset()
+        assert barrier._all_marks()["speech"] == (7, 3)
+        assert "lockstep/b" not in barrier._all_marks()
+        barrier._publish_tick(PERIOD_NS)
+        assert "speech" not in barrier._all_marks()
+        barrier.close()
 
 
 def test_a_killed_member_is_named_and_joins_again(

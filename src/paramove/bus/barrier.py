@@ -60,6 +60,7 @@ class LockstepBarrier:
         self._pidfds: dict[str, int] = {}
         self._answered: set[str] = set()
         self._newcomers: dict[str, TickDone] = {}
+        self._last_marks: dict[str, tuple[int, int]] = {}  # of members that have left since the latest tick
         self.lost: list[str] = []
         self.tick = 0
         self.rejected = 0
@@ -110,11 +111,12 @@ class LockstepBarrier:
         clock = Clock(time_ns=now_ns, tick=self.tick, period_ns=TICK_PERIOD_NS, lockstep=self._lockstep)
         clock.published.extend(from_marks(self._all_marks()))
         self._bus.publish_at_once(topics.CLOCK, clock)
+        self._last_marks.clear()
         while not self._exchange.stopped and (missing := self._marks.keys() - self._answered):
             self._wait(missing, f"be done with tick {self.tick}")
 
     def _all_marks(self) -> dict[str, tuple[int, int]]:
-        marks = self._exchange.marks()
+        marks = self._exchange.marks() | self._last_marks
         for published in self._marks.values():
             marks |= published
         return marks
@@ -166,6 +168,7 @@ class LockstepBarrier:
             return False  # of a process that is no longer a member
         self._marks[node] = marks
         if answer.kind == TickDone.KIND_LEAVE:
+            self._last_marks |= {name: mark for name, mark in marks.items() if name != member_mark(node)}
             self._remove(node, "left")
         elif answer.tick == self.tick:
             self._answered.add(node)

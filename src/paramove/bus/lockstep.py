@@ -5,7 +5,8 @@
    of every subscribed topic with a mark has welcomed it. So it misses nothing that is published later.
 3. At every later tick it reads each topic up to the tick's mark: the messages published when the tick began. Messages
    beyond the mark are queued for the next iteration. So an iteration has the same messages on any machine.
-4. When the node comes back for the next iteration it answers DONE with the marks of what it has published itself.
+4. When the node comes back for the next iteration it answers DONE with the marks of what it has published itself. One
+   that ends answers LEAVE with them, and they count for one more tick: the others read its last messages there.
 
 A topic without a mark has a publisher that time does not wait for (a person's page, a node with `lockstep: false`), and
 status topics follow wall time; their messages are handed over at the tick after they arrived.

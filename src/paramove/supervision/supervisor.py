@@ -131,8 +131,6 @@ class Supervisor:
                 outcome = self._supervise()
                 self._events.write("run_stops", sentence=outcome.reason, exit_code=outcome.code)
                 self._stop_all()
-                self._bus.drain_to_the_last(list(self._bus.subscribers))
-                self._read_bus()
             finally:
                 self._kill_all()
                 self._bus.close()
