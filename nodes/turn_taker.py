@@ -8,7 +8,6 @@ Publishes   NAMESPACE/relocation/goal     RelocationGoal     event   arm_base
 
 from paramove.applications import ReachStep, Turns
 from paramove.bus import Bus, NodeConfig, Tick, main, publish_each, topics
-from paramove.documents import InputError
 
 SUBSCRIBES = (topics.RELOCATION_STATUS, topics.ARM_SAFETY)
 PUBLISHES = (topics.RELOCATION_GOAL, topics.SPEECH)
@@ -23,8 +22,8 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until all turns are done, a task cannot be done, or the bus closes."""
     turns = Turns(config.turns, f"turns-{bus.now_ns}")
-    if strange := sorted(set(turns.arms) - set(bus.settings.namespaces)):
-        raise InputError(f"tasks of arms in namespaces that this run does not have: {', '.join(strange)}")
+    bus.settings.check_namespaces(turns.arms)
+    published = {arm: [topics.topic_in(arm, topic) for topic in PUBLISHES] for arm in turns.arms}
     bus.ready(turns.detail)
     for event in bus.events(tick=True):
         if not isinstance(event, Tick):
@@ -33,8 +32,7 @@ def run(bus: Bus, config: Config) -> None:
             handle(arm, event.message)
             continue
         for arm, output in turns.tick(event.now_ns).items():
-            published = [topics.topic_in(arm, topic) for topic in PUBLISHES]
-            publish_each(bus, published, (output.goals, output.speech))
+            publish_each(bus, published[arm], (output.goals, output.speech))
         if turns.failure:
             bus.failed(turns.failure)
         if turns.finished or turns.failure:

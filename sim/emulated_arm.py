@@ -132,27 +132,30 @@ class EmulatedArm:
         """The same, for a caller that keeps the world still meanwhile."""
         data = self.mechanics.data
         message = TruthState(time_ns=now_ns, joint_positions=self.mechanics.angles(self._joint_names))
-        rotation, origin = self._frame()
-        turn, quaternion = np.empty(4), np.empty(4)
-        mujoco.mju_mat2Quat(turn, rotation.ravel())
+        origin, turn = self._frame()
+        position, quaternion = np.empty(3), np.empty(4)
         if self.robot.chain is not None:
             end_effector = data.site(self._prefix + self.robot.chain.sites.end_effector)
-            message.gripper.extend((rotation @ end_effector.xpos + origin).tolist())
+            mujoco.mju_trnVecPose(position, origin, turn, end_effector.xpos)
+            message.gripper.extend(position.tolist())
         for name in self._objects:
             body = data.body(name)
-            x, y, z = (rotation @ body.xpos + origin).tolist()
+            mujoco.mju_trnVecPose(position, origin, turn, body.xpos)
             mujoco.mju_mulQuat(quaternion, turn, body.xquat)
+            x, y, z = position.tolist()
             message.objects.add(name=name, x=x, y=y, z=z, quaternion_xyzw=quaternion[[1, 2, 3, 0]].tolist())
         return message
 
     def _frame(self) -> tuple[Floats, Floats]:
-        """Rotation [3, 3] and origin [3], m, of the world in the frame of the truth."""
-        if not self._prefix:
-            return np.eye(3), np.zeros(3)
-        assert self.robot.chain is not None
-        base = self.mechanics.data.site(self._prefix + self.robot.chain.sites.base)
-        rotation = base.xmat.reshape(3, 3).T
-        return rotation, -rotation @ base.xpos
+        """Origin [3], m, and quaternion [4] (w, x, y, z) of the world in the frame of the truth."""
+        origin, turn = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+        if self._prefix:
+            assert self.robot.chain is not None
+            base = self.mechanics.data.site(self._prefix + self.robot.chain.sites.base)
+            base_turn = np.empty(4)
+            mujoco.mju_mat2Quat(base_turn, base.xmat)
+            mujoco.mju_negPose(origin, turn, base.xpos, base_turn)
+        return origin, turn
 
 
 @contextlib.contextmanager

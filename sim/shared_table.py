@@ -10,7 +10,6 @@ from pathlib import Path
 from pydantic import Field
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
-from paramove.documents import InputError
 from paramove.workspace import Workspace
 from sim.table_arms import MountedArm, TableArms
 
@@ -35,8 +34,7 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then remove the ports. Servos run in real time, independent of the bus clock."""
-    if strange := sorted(set(config.arms) - set(bus.settings.namespaces)):
-        raise InputError(f"arms of namespaces that this run does not have: {', '.join(strange)}")
+    bus.settings.check_namespaces(config.arms)
     scene = Workspace.here().find(config.scene)
     with TableArms(scene, config.arms, bus.run_folder, config.port, config.seed) as table:
         table.write_model(bus.run_folder / MODEL_FILE)

@@ -130,6 +130,7 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, the scene is finished or the simulated time is up."""
     log_warnings_of_mujoco()
+    bus.settings.check_namespaces(config.robots)
     with contextlib.ExitStack() as open_files:
         log = None
         if config.firmware_log:  # without a buffer: nothing is lost when the process is killed

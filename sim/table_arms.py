@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -79,7 +80,7 @@ class TableArms:
                 advance=advance,
                 prefix=f"{namespace}_",
             )
-            advance = self._step_of(arm)
+            advance = partial(self._step_arm, arm)
             self._arms[namespace] = arm
         self._first = self._arms[first]
         self._open = contextlib.ExitStack()
@@ -119,13 +120,8 @@ class TableArms:
     def _step_world(self) -> None:
         mujoco.mj_step(self.model, self.data)
 
-    def _step_of(self, arm: EmulatedArm) -> Callable[[], None]:
-        def step() -> None:
-            steps = round(self.data.time * 1e9 / NS_PER_STEP) + 1
-            with arm.emulator.lock:
-                arm.emulator.run_to(steps * NS_PER_STEP)
-
-        return step
+    def _step_arm(self, arm: EmulatedArm) -> None:
+        arm.run_to(round(self.data.time * 1e9 / NS_PER_STEP) + 1)
 
 
 def _world(scene: Path, arms: Mapping[str, MountedArm], robots: Mapping[str, RobotDescription]) -> mujoco.MjModel:

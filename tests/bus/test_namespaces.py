@@ -9,6 +9,7 @@ import pytest
 from paramove.bus import inspection, topics
 from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
+from paramove.documents import InputError
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.safety_state_pb2 import StopRequest
 from tests.bus.conftest import Wait
@@ -62,6 +63,12 @@ def test_a_node_for_every_namespace_gets_all_by_their_names(folder: Path, wait: 
 
 def test_a_node_in_a_namespace_is_for_that_alone(folder: Path) -> None:
     assert in_namespace(folder, "left").in_every_namespace((topics.GESTURES,)) == (topics.GESTURES,)
+
+
+def test_a_namespace_that_the_run_does_not_have_is_rejected_with_those_that_it_has(folder: Path) -> None:
+    in_namespace(folder, "").check_namespaces(["right", "left"])
+    with pytest.raises(InputError, match="no namespace lift; it has left, right"):
+        in_namespace(folder, "").check_namespaces(["lift", "left"])
 
 
 def test_a_stop_reaches_every_namespace(folder: Path, wait: Wait) -> None:

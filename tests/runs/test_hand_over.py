@@ -10,6 +10,7 @@ import pytest
 from paramove.bus import topics
 from paramove.recording.writer import RecordingWriter
 from paramove.runs import hand_over
+from sim import shared_table
 from sim.table_arms import TableArms
 from tests.sim.test_table_arms import KOCH, PORT, SCENE, TWO
 
@@ -23,7 +24,7 @@ TABLE = f"parameters: {{arms: {{left: {{robot: {KOCH}}}, right: {{robot: {KOCH},
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A run of which only the begin and the end are recorded; the red cube is moved as a test says."""
+    """A run of which only the begin and the end are recorded; a test moves the red cube."""
     (tmp_path / "nodes").mkdir()
     (tmp_path / "nodes" / "turn_taker.yaml").write_text(TURNS)
     (tmp_path / "nodes" / "shared_table.yaml").write_text(TABLE)
@@ -58,6 +59,10 @@ def test_what_changed_hands_counts_where_the_last_arm_should_put_it(
     assert task["wanted"] == pytest.approx([0.23, 0.08, 0.012])
     assert task["good"] == (code == 0)
     assert (folder / "report.html").is_file()
+
+
+def test_the_report_reads_the_model_that_the_table_writes() -> None:
+    assert hand_over.MODEL_FILE == shared_table.MODEL_FILE
 
 
 @pytest.mark.parametrize(

@@ -209,6 +209,12 @@ def test_the_same_node_in_two_namespaces_has_topics_of_its_own(workspace):
         checked(workspace, f"nodes:\n{alone}")
 
 
+@pytest.mark.parametrize("namespace", ["truth", "status"])
+def test_what_names_of_topics_begin_with_is_no_namespace(workspace, namespace):
+    with pytest.raises(DocumentError, match=f"'{namespace}' is no namespace"):
+        checked(workspace, f"nodes:\n  robot: {{module: nodes.actor, namespace: {namespace}}}")
+
+
 def test_a_node_for_every_namespace_has_the_topics_of_each(workspace):
     source = (workspace.root / "nodes" / "listener.py").read_text()
     entry = 'if __name__ == "__main__":\n    main(run, SUBSCRIBES, PUBLISHES, Config, every_namespace=True)\n'

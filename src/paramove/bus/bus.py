@@ -188,7 +188,7 @@ class Bus:
 
     def rest(self) -> list[Received]:
         """What has arrived and no loop has taken, oldest first: for a node that is about to end."""
-        self.exchange.drain_to_the_last(self._subscribed)
+        self.exchange.drain_to_the_last()
         rest = self._backlog + self.exchange.take(self._subscribed)
         self._backlog = []
         return rest

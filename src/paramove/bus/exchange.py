@@ -7,7 +7,7 @@ import math
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from operator import attrgetter
 from typing import Any
 
@@ -233,15 +233,15 @@ class Exchange:
                 if self.urgent_first and not received.topic.is_urgent and self._urgent_waits():
                     return
 
-    def drain_to_the_last(self, topics: Sequence[str]) -> None:
+    def drain_to_the_last(self) -> None:
         """Drains until nothing more arrives for `QUIET_S`, or `LAST_S` have passed; also once the bus is stopped."""
         poller = zmq.Poller()
-        for name in topics:
-            poller.register(self.subscribers[name].socket, zmq.POLLIN)
+        for subscriber in self.subscribers.values():
+            poller.register(subscriber.socket, zmq.POLLIN)
         end_s = time.monotonic() + LAST_S
-        self.drain(topics)
+        self.drain(self.subscribers)
         while poller.poll(math.ceil(1000 * QUIET_S)) and time.monotonic() < end_s:
-            self.drain(topics)
+            self.drain(self.subscribers)
 
     def take_urgent(self) -> list[Received]:
         """What has arrived of the urgent topics: stops first, each topic in order of arrival.

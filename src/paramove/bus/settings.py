@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from paramove.bus.topics import Topic, name_in, topic_in
+from paramove.bus.topics import Topic, in_all, name_on_bus
 from paramove.documents import InputError, checked_name
 
 
@@ -87,11 +87,14 @@ class BusSettings(BaseModel):
 
     def name_of(self, topic: Topic) -> str:
         """Name of the topic on the bus."""
-        remapped = self.remaps.get(topic.name)
-        return name_in(self.namespace, topic.name) if remapped is None else remapped
+        return name_on_bus(topic.name, self.remaps, self.namespace)
 
-    def in_every_namespace(self, topics: Sequence[Topic]) -> tuple[Topic, ...]:
+    def in_every_namespace(self, rows: Sequence[Topic]) -> Sequence[Topic]:
         """The topics, and for a node outside of namespaces those of each namespace, too, each once."""
-        spaces = ("", *self.namespaces) if not self.namespace else ("",)
-        named = [topic_in(space, topic) for space in spaces for topic in topics]
-        return tuple({topic.name: topic for topic in named}.values())
+        return rows if self.namespace else in_all(self.namespaces, rows)
+
+    def check_namespaces(self, names: Iterable[str]) -> None:
+        """Raises InputError if the run does not have one of these namespaces."""
+        if strange := sorted(set(names) - set(self.namespaces)):
+            present = ", ".join(self.namespaces) or "none"
+            raise InputError(f"this run has no namespace {', '.join(strange)}; it has {present}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import enum
 import re
 import warnings
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -287,9 +288,21 @@ def name_in(namespace: str, name: str) -> str:
     return f"{namespace}/{name}"
 
 
+def name_on_bus(name: str, remaps: Mapping[str, str], namespace: str) -> str:
+    """Name on the bus of a topic that a node calls `name`: that of its remaps, or else that in its namespace."""
+    return remaps[name] if name in remaps else name_in(namespace, name)
+
+
 def topic_in(namespace: str, topic: Topic) -> Topic:
     """The topic as a program outside of that namespace names it."""
     return replace(topic, name=name_in(namespace, topic.name))
+
+
+def in_all(namespaces: Iterable[str], rows: Iterable[Topic]) -> tuple[Topic, ...]:
+    """The topics of the run itself and those of each namespace, each once."""
+    rows = tuple(rows)
+    named = [topic_in(namespace, topic) for namespace in ("", *namespaces) for topic in rows]
+    return tuple({topic.name: topic for topic in named}.values())
 
 
 def split_name(name: str) -> tuple[str, str]:

@@ -17,10 +17,10 @@ import mujoco
 import numpy as np
 from rich.console import Console
 
-from paramove.documents import Floats, InputError, read_document
+from paramove.documents import Floats
 from paramove.robots import RobotDescription
 from paramove.runs.after_a_run import evaluated
-from paramove.runs.recorded_run import RunFolderError
+from paramove.runs.recorded_run import RunFolderError, parameter_in
 from paramove.runs.servo_arm import results_of, show_results, truth_in
 from paramove.runs.servo_arm_film import FilmedArm, base_of, write_film
 
@@ -37,10 +37,10 @@ def _evaluate(options: argparse.Namespace, console: Console) -> tuple[bool, list
     model = _model_in(folder)
     arms = {
         namespace: FilmedArm(RobotDescription.load(Path(arm["robot"])), truth_in(folder, namespace), f"{namespace}_")
-        for namespace, arm in _parameter(folder, "shared_table", "arms").items()
+        for namespace, arm in parameter_in(folder, "shared_table", "arms", dict).items()
     }
     first = next(iter(arms.values()))
-    tasks = tasks_in_frame_of(first, model, arms, _parameter(folder, "turn_taker", "turns"))
+    tasks = tasks_in_frame_of(first, model, arms, parameter_in(folder, "turn_taker", "turns", list))
     name = " and ".join(dict.fromkeys(arm.robot.name for arm in arms.values()))
 
     def make_film() -> Path | None:
@@ -57,29 +57,23 @@ def tasks_in_frame_of(
 
     Reaches are left out: where an arm reached to is in its own states.
     """
-    to_world, from_world = base_of(model, first), {name: base_of(model, arm) for name, arm in arms.items()}
+    first_from_world = np.empty(3), np.empty(4)
+    mujoco.mju_negPose(*first_from_world, *base_of(model, first))
+    world_from_arm = {name: base_of(model, arm) for name, arm in arms.items()}
     tasks = []
     for turn in turns:
         for arm, step in turn.items():
             if step.get("place") is not None:
-                moved = {key: _in_frame(to_world, _in_world(from_world[arm], step[key])) for key in ("pick", "place")}
-                tasks.append(moved)
+                in_world = {key: _moved(world_from_arm[arm], step[key]) for key in ("pick", "place")}
+                tasks.append({key: _moved(first_from_world, position) for key, position in in_world.items()})
     return tasks
 
 
-def _in_world(base: tuple[Floats, Floats], position: Sequence[float]) -> Floats:
-    origin, turn = base
-    turned = np.empty(3)
-    mujoco.mju_rotVecQuat(turned, np.array(position, dtype=float), turn)
-    return origin + turned
-
-
-def _in_frame(base: tuple[Floats, Floats], position: Floats) -> Floats:
-    origin, turn = base
-    back, turned = np.empty(4), np.empty(3)
-    mujoco.mju_negQuat(back, turn)
-    mujoco.mju_rotVecQuat(turned, position - origin, back)
-    return turned
+def _moved(pose: tuple[Floats, Floats], position: Sequence[float] | Floats) -> Floats:
+    """A position [3] after a pose: origin [3] and quaternion [4]."""
+    moved = np.empty(3)
+    mujoco.mju_trnVecPose(moved, *pose, np.array(position, dtype=float))
+    return moved
 
 
 def _model_in(folder: Path) -> mujoco.MjModel:
@@ -88,15 +82,6 @@ def _model_in(folder: Path) -> mujoco.MjModel:
         return mujoco.MjModel.from_binary_path(str(path))
     except ValueError as error:
         raise RunFolderError(f"{path}: no model of the table of a run ({error})") from error
-
-
-def _parameter(folder: Path, node: str, name: str) -> Any:
-    """A parameter that a node had; raises RunFolderError."""
-    path = folder / "nodes" / f"{node}.yaml"
-    try:
-        return read_document(path, "configuration of a node").data["parameters"][name]
-    except (InputError, KeyError) as error:
-        raise RunFolderError(f"{path} has no {name} of the run ({error!r})") from error
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ from paramove.documents import Floats, InputError, read_document
 from paramove.msgs.rule_pb2 import ApplicationStage
 from paramove.recording import PartedRecording, Recorded
 from paramove.runs.traffic import Traffic
+
+Kind = TypeVar("Kind")
 
 HEAVY = frozenset(
     topic.name
@@ -282,6 +284,18 @@ def judged(path: Path, otherwise: str) -> dict[str, Any]:
         return {"success": False, "reason": otherwise}
     content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return content
+
+
+def parameter_in(folder: Path, node: str, name: str, kind: type[Kind]) -> Kind:
+    """A parameter of this kind that a node of the run had; raises RunFolderError."""
+    path = folder / "nodes" / f"{node}.yaml"
+    try:
+        value = read_document(path, "configuration of a node").data["parameters"][name]
+    except (InputError, KeyError, TypeError) as error:
+        raise RunFolderError(f"{path} has no {name} of the run ({error!r})") from error
+    if not isinstance(value, kind):
+        raise RunFolderError(f"{path} has no {name} of the run (found {value!r:.80})")
+    return value
 
 
 def robot_in(folder: Path) -> Path | None:

@@ -18,12 +18,12 @@ import numpy as np
 from rich.console import Console
 
 from paramove.bus import topics
-from paramove.documents import Floats, InputError, film, image, read_document, report_page, section, table
+from paramove.documents import Floats, film, image, report_page, section, table
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording import PartedRecording
 from paramove.robots import RobotDescription
 from paramove.runs.after_a_run import evaluated, verdict, write_report, write_run_json
-from paramove.runs.recorded_run import RunFolderError, robot_in
+from paramove.runs.recorded_run import RunFolderError, parameter_in, robot_in
 
 REACHED_M, PLACED_M = 0.015, 0.010
 """The hand hangs below its commanded position: a servo holds a load by its position error."""
@@ -84,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _evaluate(options: argparse.Namespace, console: Console) -> tuple[bool, list[Path | None]]:
     folder = options.run_folder
     states = truth_in(folder)
-    results = results_of(_tasks_in(folder), states)
+    results = results_of(parameter_in(folder, "reacher", "tasks", list), states)
     robot = robot_in(folder)
     if robot is None:
         return show_results(folder, "a servo arm", results, states, None, console)
@@ -143,14 +143,6 @@ def truth_in(folder: Path, namespace: str = "") -> list[TruthState]:
     if not (folder / "nodes" / "judge.yaml").is_file():
         raise RunFolderError(f"no truth.mcap in {folder}: only emulated runs, which have a node judge, write one")
     raise RunFolderError(f"nothing to judge in {folder}: the run ended before the emulated arm published a state")
-
-
-def _tasks_in(folder: Path) -> list[dict[str, Any]]:
-    path = folder / "nodes" / "reacher.yaml"
-    try:
-        return list(read_document(path, "configuration of a node").data["parameters"]["tasks"])
-    except (InputError, KeyError, TypeError) as error:
-        raise RunFolderError(f"{path} has no tasks of the run ({error!r})") from error
 
 
 def _write_report(folder: Path, robot: str, results: Sequence[TaskResult], picture: Path, video: Path | None) -> Path:

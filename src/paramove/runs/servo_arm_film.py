@@ -96,8 +96,7 @@ def _qpos(model: mujoco.MjModel, arms: Sequence[FilmedArm], states: Sequence[Tru
     for body in states[0].objects:
         first = model.jnt_qposadr[model.body(body.name).jntadr[0]]
         x, y, z, w = body.quaternion_xyzw
-        mujoco.mju_rotVecQuat(qpos[first : first + 3], np.array([body.x, body.y, body.z]), turn)
-        qpos[first : first + 3] += origin
+        mujoco.mju_trnVecPose(qpos[first : first + 3], origin, turn, np.array([body.x, body.y, body.z]))
         mujoco.mju_mulQuat(qpos[first + 3 : first + 7], turn, np.array([w, x, y, z]))
     for i in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):  # fingers that a crank drives
         follower, leader = (model.jnt_qposadr[joint[i]] for joint in (model.eq_obj1id, model.eq_obj2id))

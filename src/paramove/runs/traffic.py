@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from paramove.bus import BusSettings, topics
+from paramove.bus import topics
 from paramove.documents import read_document
 from paramove.recording import Recorded
 from paramove.supervision import InterfaceError, read_interface
@@ -91,7 +91,6 @@ def publishers_of(launch_file: Path, workspace: Workspace) -> dict[str, str]:
         except (InterfaceError, KeyError):
             continue
         remaps, namespace = settings.get("remaps", {}), settings.get("namespace", "")
-        view = BusSettings(folder=Path(), remaps=remaps, namespace=namespace)
-        publishers |= {view.name_of(topic): node for topic in interface.publishes}
+        publishers |= {topics.name_on_bus(topic.name, remaps, namespace): node for topic in interface.publishes}
         publishers[topics.status(node).name] = node
     return publishers

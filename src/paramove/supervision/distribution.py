@@ -10,9 +10,8 @@ import subprocess
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
 
-from paramove.bus import CLOCK, BusSettings, Topic, topics
+from paramove.bus import CLOCK, Topic, topics
 from paramove.documents import DocumentError, InputError, nearest
 from paramove.hosts import HostKeys, Peer, RelaySettings
 from paramove.supervision.interfaces import Interface
@@ -47,7 +46,7 @@ def ssh_command(host: HostSettings, *words: str) -> list[str]:
 def on_bus(launch: Launch, node: str, topic: Topic) -> str:
     """Name on the bus of a topic of a node, after its remaps and in its namespace."""
     settings = launch.file.nodes[node]
-    return BusSettings(folder=Path(), remaps=settings.remaps, namespace=settings.namespace).name_of(topic)
+    return topics.name_on_bus(topic.name, settings.remaps, settings.namespace)
 
 
 def own_host(file: LaunchFile) -> str | None:

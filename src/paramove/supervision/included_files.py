@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from paramove.bus import topics
@@ -18,7 +18,7 @@ LISTS = ("seed_parameters", "connections", "external")
 _REFERENCE = re.compile(r"\{(\w+)\.")
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Included:
     """A launch file as a part of another.
 
@@ -33,29 +33,31 @@ class _Included:
     without: frozenset[str]
     file: LaunchFile
     document: Document
-    data: dict[str, Any] = field(init=False)
 
-    def __post_init__(self) -> None:
-        written = self.document.data
-        data: dict[str, Any] = {"nodes": dict(self._nodes(written["nodes"]))}
-        for key in ("seed_parameters", "connections"):
-            data[key] = [self._prefixed(target) for target in written.get(key, []) if self._has(target)]
-        data["external"] = [topics.name_in(self.namespace, topic) for topic in written.get("external", [])]
-        headless = written.get("headless", {})
-        data["headless"] = {self._prefixed(name): headless[name] for name in headless if self._has(name)}
-        data["needs"] = dict(self._needs(written.get("needs", {})))
-        data |= {key: written[key] for key in ("bus", "hosts") if key in written}
-        if self.file.after_run is not None:
-            data["after_run_of"] = {self.namespace: self.file.after_run}
-        self.data = data
+    def entries(self, key: str) -> list[str]:
+        """Its entries of one of `LISTS`."""
+        written = self.document.data.get(key, [])
+        if key == "external":
+            return [topics.name_in(self.namespace, topic) for topic in written]
+        return [self._prefixed(target) for target in written if self._has(target)]
 
     def as_document(self) -> Document:
-        """Its content for the including file; the positions of its nodes are those in the file itself."""
+        """The rest of its content; the positions of its nodes are those in the file itself."""
+        written = self.document.data
+        headless = written.get("headless", {})
+        data: dict[str, Any] = {
+            "nodes": dict(self._nodes(written["nodes"])),
+            "headless": {self._prefixed(name): headless[name] for name in headless if self._has(name)},
+            "needs": dict(self._needs(written.get("needs", {}))),
+            **{key: written[key] for key in ("bus", "hosts") if key in written},
+        }
+        if self.file.after_run is not None:
+            data["after_run_of"] = {self.namespace: self.file.after_run}
         positions: dict[KeyPath, Position] = {}
         for path, position in self.document.positions.items():
             if path[:1] in (("nodes",), ("needs",)) and len(path) > 1:
                 positions[path[0], self._prefixed(path[1]), *path[2:]] = position
-        return Document(self.data, positions)
+        return Document(data, positions)
 
     def _prefixed(self, name: str) -> str:
         return f"{self.namespace}_{name}"
@@ -88,7 +90,7 @@ def with_included(document: Document, read: Callable[[str, IncludedFile], tuple[
 
     Args:
         document: The file with its overlays.
-        read: Reads an included file by its namespace and what the key says of it, with its overlays; checked.
+        read: Reads an included file by its namespace and the settings under the key, with its overlays; checked.
 
     Raises DocumentError with what is wrong with the key, and what `read` raises.
     """
@@ -103,21 +105,19 @@ def with_included(document: Document, read: Callable[[str, IncludedFile], tuple[
         except DocumentError as error:
             findings.append(error)
     raise_any([*findings, *_different_buses(document, included)])
-    own = {key: value for key, value in document.data.items() if key != "include"}
-    result = Document({}, {})
-    entries: dict[str, list[Any]] = {key: [] for key in LISTS}
+    below = Document({}, {})
     for one in included:
-        for key in LISTS:
-            entries[key] += one.data.pop(key)
-        if "after_run" in own:  # which judges the whole run
-            one.data.pop("after_run_of", None)
-        result = result.overlaid(one.as_document())
+        below = below.overlaid(one.as_document())
+    own = {key: value for key, value in document.data.items() if key != "include"}
+    if "after_run" in own:  # which judges the whole run
+        below.data.pop("after_run_of", None)
     positions = dict(document.positions)
     for key in LISTS:
-        if isinstance(own.get(key, []), list):
-            positions |= _moved(document, key, len(entries[key]))
-            own[key] = entries[key] + own.get(key, [])
-    merged = result.overlaid(Document(own, positions))
+        entries = [entry for one in included for entry in one.entries(key)]
+        if isinstance(own.get(key, []), list):  # anything else is found when the file is checked
+            positions |= _moved(document, key, len(entries))
+            own[key] = entries + own.get(key, [])
+    merged = below.overlaid(Document(own, positions))
     return Document(merged.data, {**merged.positions, (): document.position(())})
 
 

@@ -116,8 +116,7 @@ class Supervisor:
         An interrupted run is not judged: they are left out.
         """
         self._bus = Exchange("supervisor", BusSettings(folder=self._bus_folder))
-        stories = BusSettings(folder=self._bus_folder, namespaces=self._file.namespaces).in_every_namespace(STORIES)
-        for topic in (*stories, *map(topics.status, self.nodes)):
+        for topic in (*topics.in_all(self._file.namespaces, STORIES), *map(topics.status, self.nodes)):
             self._bus.subscribe(topic)
         control = ControlServer(self._bus_folder, self._by_hand)
         with (

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fnmatch import fnmatchcase
-from pathlib import Path
 
-from paramove.bus import CLOCK, BusSettings, Topic, topics
+from paramove.bus import CLOCK, Topic, topics
 from paramove.documents import DocumentError, nearest, raise_any
 from paramove.supervision.distribution import on_bus, wrong_hosts
+from paramove.supervision.included_files import NO_NAMESPACES
 from paramove.supervision.interfaces import Interface, InterfaceError, read_interface, source_of
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.launch_schema import NodeSettings
@@ -48,10 +48,10 @@ def read_interfaces(launch: Launch, workspace: Workspace, *, may_import: bool = 
 
 def _in_namespaces(launch: Launch, node: NodeSettings, interface: Interface) -> Interface:
     """The interface with the topics that the node has in this launch file."""
-    if not interface.every_namespace:
+    if not interface.every_namespace or node.namespace:
         return interface
-    view = BusSettings(folder=Path(), namespace=node.namespace, namespaces=launch.file.namespaces)
-    subscribes, publishes = map(view.in_every_namespace, (interface.subscribes, interface.publishes))
+    rows = (interface.subscribes, interface.publishes)
+    subscribes, publishes = (topics.in_all(launch.file.namespaces, some) for some in rows)
     return replace(interface, subscribes=subscribes, publishes=publishes)
 
 
@@ -61,12 +61,19 @@ def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Itera
     Every topic with a subscriber has a publisher, no topic has two, only nodes with `truth: true` know a truth topic,
     and topics that the file names exist.
     """
+    yield from _namespaces(launch)
     yield from _clock(launch, interfaces)
     yield from _publishers(launch, interfaces)
     yield from _subscribers(launch, interfaces)
     yield from wrong_hosts(launch, interfaces)
     yield from _named_topics(launch, interfaces)
     yield from _external_topics(launch, interfaces)
+
+
+def _namespaces(launch: Launch) -> Iterator[DocumentError]:
+    for name, node in launch.file.nodes.items():
+        if node.namespace in NO_NAMESPACES:
+            yield launch.error(("nodes", name, "namespace"), f"{node.namespace!r} is no namespace")
 
 
 def clock_publisher(interfaces: Mapping[str, Interface]) -> str | None:
