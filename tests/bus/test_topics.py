@@ -59,6 +59,13 @@ def test_a_topic_exists_in_each_namespace_but_what_is_of_the_whole_run(name: str
     assert topics.split_name(on_the_bus) == (("left", name) if on_the_bus != name else ("", name))
 
 
+def test_the_topics_of_the_run_itself_are_the_rows_of_the_table() -> None:
+    run, *left = topics.in_all(["left"], [topics.SPEECH])
+    assert run is topics.SPEECH, "nodes compare rows by identity"
+    assert [topic.name for topic in left] == ["left/speech"]
+    assert topics.topic_in("left", topics.CLOCK) is topics.CLOCK
+
+
 @pytest.mark.parametrize(
     "name", ["left/clock", "left/operator/stop", "left/right/speech", "left/speach", "truth/left/x"]
 )

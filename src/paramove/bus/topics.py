@@ -294,8 +294,9 @@ def name_on_bus(name: str, remaps: Mapping[str, str], namespace: str) -> str:
 
 
 def topic_in(namespace: str, topic: Topic) -> Topic:
-    """The topic as a program outside of that namespace names it."""
-    return replace(topic, name=name_in(namespace, topic.name))
+    """The topic as a program outside of that namespace names it: the same row where it has the same name there."""
+    name = name_in(namespace, topic.name)
+    return topic if name == topic.name else replace(topic, name=name)
 
 
 def in_all(namespaces: Iterable[str], rows: Iterable[Topic]) -> tuple[Topic, ...]:
