@@ -35,6 +35,20 @@ def test_what_is_published_comes_back(node):
         assert run.latest("rules").rules[0].text == "again"
 
 
+def test_who_asked_for_the_latest_message_listens_from_then_on(node):
+    with connect() as run:
+        run.latest("rules", 30.0)
+        for text in ("one", "two"):
+            assert run.publish("speech", {"text": text}, wait_s=30.0)
+            until(lambda text=text: run.latest("rules").rules and run.latest("rules").rules[0].text == text, text)
+        rules = run.listen("rules", seconds=30.0)
+        assert run.publish("speech", {"text": "three"})
+        assert [next(rules).message.rules[0].text for _ in range(2)] == ["two", "three"]
+        assert run.publish("speech", {"text": "four"})
+        assert run.latest("rules").rules
+        assert next(run.listen("rules", seconds=30.0)).message.rules[0].text == "four"
+
+
 def test_a_topic_without_messages_is_reported_with_its_publisher(node):
     with connect() as run:
         with pytest.raises(NoMessageError, match=r"gestures: no publisher within 0\.1 s"):

@@ -70,7 +70,7 @@ class Run:
         self._folder, self.name, self.namespace = folder, name, namespace
         self._subscribers: dict[str, Subscriber] = {}
         self._publishers: dict[str, Publisher] = {}
-        self._received: dict[str, deque[Received]] = {}
+        self._queues: dict[str, deque[Received]] = {}
         self._latest: dict[str, Received] = {}
         self._now_ns = 0
         self.is_simulated = False
@@ -117,18 +117,31 @@ class Run:
         return self._latest[row.name].message
 
     def listen(self, *names: str | Topic, seconds: float = math.inf) -> Iterator[Received]:
-        """Messages of topics with their times, as they arrive within `seconds`.
+        """Messages of topics with their times, as they arrive within `seconds` of this call.
+
+        The first is the latest one of a latched topic. What arrives between two calls for the same topic is not lost:
+        the second call begins with it.
 
         Raises InputError for a wrong name, ValueError if `seconds` is no number.
         """
         if math.isnan(seconds):
             raise ValueError("seconds: a number expected, found nan")
-        rows = [self._subscribe(self._named(name)) for name in names]
-        until_s = time.monotonic() + seconds
+        queues = [self._queue_of(self._subscribe(self._named(name))) for name in names]
+        return self._taken_from(queues, time.monotonic() + seconds)
+
+    def _queue_of(self, topic: Topic) -> deque[Received]:
+        """What arrived on a topic since somebody first listened to it, and was not taken yet."""
+        if topic.name not in self._queues:
+            self._queues[topic.name] = deque(maxlen=topic.high_water_mark)
+            if topic.profile is topics.Profile.LATCHED and topic.name in self._latest:
+                self._queues[topic.name].append(self._latest[topic.name])
+        return self._queues[topic.name]
+
+    def _taken_from(self, queues: list[deque[Received]], until_s: float) -> Iterator[Received]:
         while True:
-            for row in rows:
-                while self._received[row.name]:
-                    yield self._received[row.name].popleft()
+            for queue in queues:
+                while queue:
+                    yield queue.popleft()
             left_s = until_s - time.monotonic()
             if left_s <= 0.0:
                 return
@@ -201,7 +214,7 @@ class Run:
         message.id = message.id or f"{self.name} {time.monotonic_ns()}"
         message.attempt = message.attempt or 1
         status_topic = self._subscribe(self._named(topics.RELOCATION_STATUS))
-        self._received[status_topic.name].clear()
+        self._queue_of(status_topic).clear()
         until_s, latest = time.monotonic() + timeout_s, RelocationStatus()
         while time.monotonic() < until_s:
             if latest.state == RelocationStatus.STATE_UNSPECIFIED:  # repeated until it is acknowledged
@@ -239,7 +252,6 @@ class Run:
     def _subscribe(self, topic: Topic) -> Topic:
         if topic.name not in self._subscribers:
             self._subscribers[topic.name] = self._visitor.subscriber(topic)
-            self._received[topic.name] = deque(maxlen=topic.high_water_mark)
         return topic
 
     def offer(self, topic: Topic) -> Publisher:
@@ -266,7 +278,8 @@ class Run:
         inspection.wait(self._subscribers.values(), min(_SERVE_S, timeout_s))
         for name, subscriber in self._subscribers.items():
             while (received := subscriber.receive()) is not None:
-                self._received[name].append(received)
                 self._latest[name] = received
+                if name in self._queues:
+                    self._queues[name].append(received)
         if topics.CLOCK.name in self._latest:
             self._now_ns = self._latest[topics.CLOCK.name].message.time_ns
