@@ -71,12 +71,13 @@ def test_every_recorded_topic_can_be_written_and_read(tmp_path: Path) -> None:
     assert [type(one.message) for one in read(path)] == [topic.type for topic in recorded]
 
 
-def test_the_view_of_the_simulator_is_kept_as_a_picture(tmp_path: Path) -> None:
+@pytest.mark.parametrize("topic", ["truth/view", "truth/left/view"])
+def test_the_view_of_a_simulator_is_kept_as_a_picture(tmp_path: Path, topic: str) -> None:
     path = tmp_path / "truth.mcap"
     picture = CompressedImage(format="jpeg", data=b"\xff\xd8 picture")
     with RecordingWriter(path, "a test") as recording:
-        recording.write("truth/view", picture, 0, 0, 0)
-    assert [one.message for one in read(path)] == [picture]
+        recording.write(topic, picture, 0, 0, 0)
+    assert [(one.topic, one.message) for one in read(path)] == [(topic, picture)]
 
 
 def test_other_programs_can_read_it(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -93,7 +93,9 @@ def _read(path: Path, only: Collection[str], raising: type[InputError], must_be_
 
 def _row(name: str, schema: Schema | None) -> topics.Topic | None:
     """The topic's row of the table, or one by its schema in the recording; None if that cannot be read."""
-    if schema is None or name == topics.TRUTH_VIEW.name:  # the view is stored as another type
+    if topics.split_name(name)[1] == topics.TRUTH_VIEW.name:  # what a simulator shows is stored as JPEG
+        return replace(topics.TRUTH_VIEW, name=name, type=topics.CAMERA_IMAGE.type)
+    if schema is None:
         return known_row(name)
     with contextlib.suppress(InputError):
         return row_of(name, schema)
@@ -115,14 +117,13 @@ def _records(file: IO[bytes], size: int) -> Iterator[McapRecord]:
 
 
 def _decoded(path: Path, topic: topics.Topic, message: Message, raising: type[InputError]) -> Any:
-    """Decodes a message. The simulator's view is stored as JPEG, everything else as published."""
-    message_type = topics.CAMERA_IMAGE.type if topic is topics.TRUTH_VIEW else topic.type
+    """Decodes a message."""
     try:
         if len(message.data) > MESSAGE_BYTES:
             raise ValueError(f"{len(message.data)} bytes, at most {MESSAGE_BYTES} are read")
-        return message_type.FromString(message.data)
+        return topic.type.FromString(message.data)
     except (DecodeError, ValueError) as error:
         raise raising(
-            f"{path}: message {message.sequence} on {topic.name} is not a {message_type.DESCRIPTOR.full_name} "
+            f"{path}: message {message.sequence} on {topic.name} is not a {topic.type_name} "
             f"({error}); another program recorded it, or it is damaged: record it again"
         ) from error
