@@ -519,7 +519,7 @@ def rows_of(results: dict[Case, list[tuple[Stop, float]]]) -> list[dict[str, Any
         ]
         if counted:
             times_ms = 1e3 * np.array([stop.played_s - stop.received_s for stop in counted])
-            quantiles = np.quantile(times_ms, [0.5, 0.99], method="higher")
+            quantiles = np.quantile(times_ms, [0.5, 0.99], method="inverted_cdf")  # so many of the stops took no longer
             row |= dict(zip(("p50_ms", "p99_ms", "max_ms"), [*quantiles.tolist(), times_ms.max()], strict=True))
             row["person_max_ms"] = 1e3 * max(stop.played_s - stop.begun_s for stop in counted)
         rows.append(row)
