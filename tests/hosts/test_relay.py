@@ -19,6 +19,7 @@ from paramove.hosts import HostKeyError, HostKeys, link, relay
 from paramove.hosts.own_time import in_own_time
 from paramove.msgs.clock_pb2 import TickDone
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
+from paramove.msgs.parameters_pb2 import ParameterRequest
 from paramove.msgs.rule_pb2 import Rule, Rules, Speech
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
 
@@ -204,6 +205,22 @@ def clock_ahead(monkeypatch):
         return sent(self, asker, message, *behind)
 
     monkeypatch.setattr(link.Offer, "send", send)
+
+
+def test_the_first_request_of_a_program_on_another_host_reaches_who_waits_for_it(two_hosts):
+    hosts = two_hosts((topics.PARAMETERS_SET,))
+    there = hosts.settings["there"]
+    peer = there.peers["here"].model_copy(update={"outside": (topics.PARAMETERS_SET.name,)})
+    hosts.settings["there"] = there.model_copy(update={"peers": {"here": peer}})
+    node = hosts.visitor("there").subscriber(topics.PARAMETERS_SET)
+    hosts.start()
+    hosts.until(lambda: node.welcomed, node.receive)
+    program = hosts.visitor("here").publisher(topics.PARAMETERS_SET)
+    hosts.until(lambda: program.subscriptions, program.serve)
+    program.publish(ParameterRequest(node="driver", name="goal_m", value="2.0"), 0, 0)
+    received = hosts.until(node.receive)
+    assert received.message.value == "2.0"
+    assert node.counter.lost == 0
 
 
 def test_times_become_those_of_the_receiving_host(two_hosts, clock_ahead):

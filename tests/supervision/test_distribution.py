@@ -19,6 +19,9 @@ nodes: {{{nodes}}}
 CAMERA = "camera: {host: camera_pc}, colour_tracker: {host: camera_pc}"
 
 
+CHANGES = "parameters/set"
+
+
 @pytest.fixture
 def launch(tmp_path):
     def made(nodes=CAMERA, *overlays, text=OVERLAY):
@@ -34,7 +37,7 @@ def test_exactly_what_the_other_host_needs_crosses(launch):
     perceived = ("camera/image", "objects/tracked", "status/camera", "status/colour_tracker")
     stops = ("operator/stop", "operator/estop")
     assert crossing(its, application.check(its, Workspace.here())) == {
-        ("robot_pc", "camera_pc"): {name: name for name in ("camera/image_raw", "clock", "arm/safety")},
+        ("robot_pc", "camera_pc"): {name: name for name in ("camera/image_raw", "clock", "arm/safety", CHANGES)},
         ("camera_pc", "robot_pc"): {name: name for name in (*perceived, *stops)},
     }
 
@@ -62,6 +65,8 @@ def test_each_host_gets_a_relay_that_knows_the_other_by_its_pinned_key(launch, t
     assert here["wants"] == there["gives"]
     assert here["gives"] == there["wants"]
     assert "status/relay_camera_pc" in there["gives"]
+    assert here["outside"] == ["parameters/set"], "what nodes publish is published there when it comes"
+    assert there["outside"] == ["operator/estop", "operator/stop"]
 
 
 @pytest.mark.parametrize(
@@ -110,7 +115,7 @@ def test_who_may_arm_may_move_and_may_stop_an_arm_on_another_host(tmp_path, may_
     peers = nodes["relay_robot_pc"].parameters["peers"]
     desk, wall = {*peers["desk_pc"]["gives"]}, {*peers["wall_pc"]["gives"]}
     assert desk == {
-        "arm/trajectory", "operator/arm", "operator/arm_at_start", "operator/stop", "operator/estop"
+        "arm/trajectory", "operator/arm", "operator/arm_at_start", "operator/stop", "operator/estop", CHANGES
     }  # fmt: skip
     assert wall == {"operator/stop", "operator/estop", *(["operator/arm"] if may_arm else [])}
     assert "arm/safety" in peers["wall_pc"]["wants"]

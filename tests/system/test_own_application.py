@@ -29,8 +29,20 @@ def folder(tmp_path, short_folder, monkeypatch):
     return tmp_path / "my_robot"
 
 
-def paramove(folder, *words):
-    return subprocess.run([PARAMOVE, *words], cwd=folder, capture_output=True, text=True, timeout=180, check=False)
+@pytest.fixture(params=["clone", pytest.param("wheel", marks=pytest.mark.long)])
+def command(request, tmp_path):
+    """The command of the clone, or that of its wheel, installed elsewhere."""
+    if request.param == "clone":
+        return PARAMOVE
+    installed = request.getfixturevalue("installed")
+    script = tmp_path / "paramove"
+    script.write_text(f'#!/bin/sh\nPYTHONPATH="{installed}" exec {sys.executable} -m paramove.cli.main "$@"\n')
+    script.chmod(0o755)
+    return script
+
+
+def paramove(folder, *words, command=PARAMOVE):
+    return subprocess.run([command, *words], cwd=folder, capture_output=True, text=True, timeout=180, check=False)
 
 
 def test_a_new_application_runs_the_same_every_time_and_is_recorded(folder):
@@ -45,13 +57,15 @@ def test_a_new_application_runs_the_same_every_time_and_is_recorded(folder):
     assert first == second
 
 
-def test_on_two_hosts_it_runs_as_on_one(folder, tmp_path, short_folder, monkeypatch):
+@pytest.fixture
+def two_hosts(folder, command, tmp_path, short_folder, monkeypatch):
+    """A second host, which this one trusts; with the overlay `two_hosts` the driver runs there."""
     there = tmp_path / "there" / "my_robot"
     (folder / "launch" / "overlays" / "two_hosts.yaml").parent.mkdir(exist_ok=True)
     (folder / "launch" / "overlays" / "two_hosts.yaml").write_text(
         "hosts:\n"
         f"  here: {{address: 127.0.0.1, port: {free_ports()}}}\n"
-        f"  there: {{ssh: other, address: 127.0.0.1, port: {free_ports()}, folder: {there}, command: {PARAMOVE}}}\n"
+        f"  there: {{ssh: other, address: 127.0.0.1, port: {free_ports()}, folder: {there}, command: {command}}}\n"
         "nodes: {driver: {host: there}}\n"
     )
     shutil.copytree(folder, there)
@@ -60,14 +74,26 @@ def test_on_two_hosts_it_runs_as_on_one(folder, tmp_path, short_folder, monkeypa
     (tmp_path / "environment.json").write_text(json.dumps(elsewhere))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config_here"))
     monkeypatch.setenv("PARAMOVE_SSH", f"{sys.executable} {STAND_IN} {tmp_path / 'environment.json'}")
-    trusted = paramove(folder, "host", "trust", "other", "--folder", str(there), "--command", str(PARAMOVE))
+    trust = ("host", "trust", "other", "--folder", str(there), "--command", str(command))
+    trusted = paramove(folder, *trust, command=command)
     assert trusted.returncode == 0, trusted.stderr
+
+
+@pytest.mark.usefixtures("two_hosts")
+def test_on_two_hosts_it_runs_as_on_one(folder, command):
     recordings = []
     for name, words in (("one", ()), ("two", ("--with", "two_hosts"))):
-        run = paramove(folder, "launch", "my_robot", "--runs", name, *words)
+        run = paramove(folder, "launch", "my_robot", "--runs", name, *words, command=command)
         assert run.returncode == 0, run.stdout + run.stderr
         recordings.append(list(until_the_arrival(folder / name / "latest" / "recording.mcap")))
     assert recordings[0] == recordings[1]
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("two_hosts")
+@pytest.mark.parametrize("command", ["clone"], indirect=True)
+def test_a_parameter_of_a_node_on_the_other_host_can_be_changed(folder, monkeypatch):
+    change_in_lockstep(folder, monkeypatch, "--with", "two_hosts")
 
 
 def until_the_arrival(recording):
@@ -149,8 +175,13 @@ def test_the_bus_shows_a_running_application(folder):
 
 
 def test_a_parameter_that_is_changed_in_lockstep_lands_at_its_recorded_time(folder, monkeypatch):
+    change_in_lockstep(folder, monkeypatch)
+
+
+def change_in_lockstep(folder, monkeypatch, *options):
+    """A cart that is hardly pulled is pulled from the recorded time on, and arrives."""
     monkeypatch.setenv("PARAMOVE_DOMAIN", "default")
-    settings = ("--set", "driver.stiffness=1e-9", "--set", "world.ends_after_s=1e7")
+    settings = ("--set", "driver.stiffness=1e-9", "--set", "world.ends_after_s=1e7", *options)
     launched = subprocess.Popen([PARAMOVE, "launch", "my_robot", *settings], cwd=folder, stdout=subprocess.DEVNULL)
     try:
         shown = ("topic", "echo", "cart/state", "--once", "--seconds", "1")

@@ -28,20 +28,6 @@ main()
 """
 
 
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory):
-    """A folder with what the wheel installs."""
-    folder = tmp_path_factory.mktemp("wheel")
-    offline = ["--quiet", "--no-deps", "--disable-pip-version-check"]
-    pip = [sys.executable, "-m", "pip"]
-    subprocess.run([*pip, "wheel", str(ROOT), "--no-build-isolation", *offline, "-w", str(folder)], check=True)
-    (wheel,) = folder.glob("*.whl")
-    subprocess.run(
-        [*pip, "install", str(wheel), *offline, "--no-compile", "--target", str(folder / "site")], check=True
-    )
-    return folder / "site"
-
-
 @pytest.fixture
 def core(tmp_path):
     """The command without the extras, with the kernels that the clone has compiled."""

@@ -75,7 +75,7 @@ def set_value(
     """Change one of them. The change is recorded with its time.
 
     In simulated time it lands exactly at its time, 0.2 s later unless `--at` names another; a time that is over is
-    rejected.
+    rejected. In a run on several hosts the launcher's host changes the parameters of all of them.
 
     Exit codes: 0 accepted; 1 the node does not answer, or nothing runs; 75 another program changes parameters just
     now; 78 there is no such parameter, or the node does not take the value.
@@ -96,7 +96,9 @@ def _connected(folder: Path, node: str) -> Iterator[Run]:
         with Run(folder, "paramove param") as run:
             yield run
     except NoMessageError as error:
-        raise ended(f"{error}; {nearest(node, nodes_in(folder))}", exit_codes.FAILURE) from error
+        running = nodes_in(folder)
+        hint = "" if node in running else f"; {nearest(node, running)}"
+        raise ended(f"{error}{hint}", exit_codes.FAILURE) from error
 
 
 def _row(node: str, parameter: NodeParameter) -> dict[str, Any]:

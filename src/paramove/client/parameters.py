@@ -44,6 +44,8 @@ def set_parameter(
 ) -> NodeParameter:
     """Changes a parameter of a node, and waits until it is accepted; in simulated time until it is changed.
 
+    In a run on several hosts that is done on the launcher's host, for nodes of all hosts.
+
     Args:
         run: The application.
         node, name: Of the parameter.
@@ -58,7 +60,7 @@ def set_parameter(
     Raises:
         RejectedParameterError: The node does not take it.
         NoMessageError: The node does not answer in time.
-        TopicTakenError: Another program is changing parameters just now.
+        TopicTakenError: Another program is changing parameters just now, or this is not the launcher's host.
         InputError: The node has no such parameter that changes while it runs.
     """
     parameter_of(run, node, name, timeout_s)
@@ -90,8 +92,8 @@ def _answer(run: Run, request: ParameterRequest, timeout_s: float) -> NodeParame
     request.captured.FromNanoseconds(max(0, run.now_ns))
     if not run.publish(topics.PARAMETERS_SET, request, wait_s=timeout_s):
         raise NoMessageError(
-            f"nobody subscribes to {topics.PARAMETERS_SET.name} here: {request.node} has ended, or runs on another "
-            "host, where its parameters are changed"
+            f"nobody subscribes to {topics.PARAMETERS_SET.name} here: {request.node} has ended, or its host is not "
+            "connected"
         )
     return next(_reports(run, request, timeout_s))
 

@@ -60,7 +60,7 @@ from paramove.hosts.link import (
     Taken,
 )
 from paramove.hosts.own_time import LARGEST_BOUND_NS, UnknownTimeError, in_own_time
-from paramove.hosts.settings import RelaySettings
+from paramove.hosts.settings import Peer, RelaySettings
 from paramove.msgs.clock_pb2 import TickDone, TopicMark
 from paramove.msgs.safety_state_pb2 import LinkState
 
@@ -149,15 +149,22 @@ class Relay:
         self._latest: dict[tuple[str, str], tuple[int, int]] = {}
         self._link = LinkState(hosts=sorted(host for host, peer in settings.peers.items() if peer.commands))
         self._confirmed_ns = 0
-        for name, row in {item for peer in settings.peers.values() for item in peer.gives.items()}:
-            if row in topics.AWAY:  # before the first request, which has no time to wait for subscribers
-                self._publisher(topics.AWAY[row], _away_name(name, row))
+        for peer in settings.peers.values():
+            self._await_requests(peer)
         self._look_due_s = self._detail_due_s = 0.0
         self.detail = ""
         ends: list[Subscriber | Offer | Request | _Answers] = [*self._ends(), *self._offers]
         for end in [*ends, self._answers] if self._answers else ends:
             self._poller.register(end.socket, zmq.POLLIN)
             self._opened.callback(end.close)
+
+    def _await_requests(self, peer: Peer) -> None:
+        """Publishes what persons and programs there request before the first one, which waits for no subscriber."""
+        for name, row in peer.gives.items():
+            if row in topics.AWAY:
+                self._publisher(topics.AWAY[row], _away_name(name, row))
+            elif name in peer.outside:
+                self._publisher(self._topics[name], name)
 
     def __enter__(self) -> Relay:
         return self

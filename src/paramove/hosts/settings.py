@@ -16,6 +16,8 @@ class Peer(BaseModel):
         key: Its public key.
         wants: Topics that it gets from here: name on the bus -> row of the table.
         gives: Topics that come from there, likewise.
+        outside: Those of them that no node publishes, but a person or program there: nodes here have to be connected
+            before the first message.
         members: Nodes there that lockstep waits for.
         commands: Whether the arm's commands come from there, so that the arm stops when the link is lost.
     """
@@ -27,6 +29,7 @@ class Peer(BaseModel):
     key: str
     wants: dict[str, str] = Field(default_factory=dict)
     gives: dict[str, str] = Field(default_factory=dict)
+    outside: tuple[str, ...] = ()
     members: tuple[str, ...] = ()
     commands: bool = False
 

@@ -58,8 +58,8 @@ def crossing(launch: Launch, interfaces: Mapping[str, Interface]) -> Crossing:
     """Which topics cross from which host to which.
 
     The status of each node, and what nobody on the bus publishes but a person's terminal, cross to and from the
-    launcher's host. A person's stop crosses from every host to the arm's driver, an arming request from those that may
-    arm, and the answer to all of them.
+    launcher's host; changes of parameters cross from there to all others. A person's stop crosses from every host to
+    the arm's driver, an arming request from those that may arm, and the answer to all of them.
     """
     own = own_host(launch.file) or ""
     host = {name: node.host or own for name, node in launch.file.nodes.items()}
@@ -86,6 +86,7 @@ def crossing(launch: Launch, interfaces: Mapping[str, Interface]) -> Crossing:
         if host[name] != own:
             status = topics.status(name).name
             found[host[name], own][status] = status
+            found[own, host[name]][topics.PARAMETERS_SET.name] = topics.PARAMETERS_SET.name
     return dict(found)
 
 
@@ -141,14 +142,18 @@ def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostK
         name: node.model_copy(update={"host": None if node.host == own else node.host})
         for name, node in file.nodes.items()
     }
+    by_nodes = {on_bus(launch, name, topic) for name, its in interfaces.items() for topic in its.publishes}
+    by_nodes |= {topics.status(name).name for name in (*nodes, *map(_relay, file.hosts))}
     clock = next((nodes[name].host or own for name, its in interfaces.items() if CLOCK in its.publishes), own)
     for name, host in file.hosts.items():
         others = {}
         for other, peer in peers.items():
             wants, gives = crosses.get((name, other), {}), crosses.get((other, name), {})
             commands = not file.bus.lockstep and not _COMMANDS.isdisjoint(gives.values())
+            outside = tuple(sorted(gives.keys() - by_nodes))
             if wants or gives:
-                others[other] = peer.model_copy(update={"wants": wants, "gives": gives, "commands": commands})
+                crossed = {"wants": wants, "gives": gives, "outside": outside, "commands": commands}
+                others[other] = peer.model_copy(update=crossed)
         if not others:
             continue
         clock_from = clock if file.bus.lockstep and name != clock else None
