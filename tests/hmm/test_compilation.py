@@ -74,6 +74,41 @@ def test_old_machine_code_is_not_used_and_not_stored_for_ever(folder):
     assert new != old
 
 
+NESTED = """
+from paramove.hmm.compilation import {decorator}
+
+@{decorator}
+def inner(x, y):
+    total = 0.0
+    for i in range(x.size):
+{statements}
+    return total
+
+@{decorator}
+def outer(x, y):
+    return inner(x, y) + inner(y, x)
+"""
+SYMBOLS = """
+import numpy as np
+from kernel_file import outer
+outer(np.ones(3), np.ones(3))
+(assembly,) = outer.dispatcher.inspect_asm().values()
+print(any("movabs" in line and "5inner" in line and "NumbaEnv" not in line for line in assembly.splitlines()))
+"""
+
+
+@pytest.mark.parametrize(
+    ("decorator", "separate"), [("compiled", "True"), ("compiled_sums", "False"), ("compiled_arithmetic", "False")]
+)
+def test_a_kernel_that_may_round_in_several_ways_is_one_with_the_kernel_that_calls_it(folder, decorator, separate):
+    """Else the process that compiles uses another rounding of it than those that load the machine code."""
+    statements = "\n".join(
+        f"        total += y[i] * {number}.5 + total * x[i] / {number + 2}.0" for number in range(60)
+    )
+    (folder / "kernel_file.py").write_text(NESTED.format(decorator=decorator, statements=statements))
+    assert ended(started(folder, program=SYMBOLS))[0] == [separate]
+
+
 @pytest.mark.long
 def test_a_file_that_was_cut_off_is_compiled_again(folder):
     ended(started(folder, "1"))

@@ -10,6 +10,14 @@ from typing import Any, TypeVar, cast
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+_WITHIN_CALLERS = True
+"""What may be rounded in several ways becomes a part of each kernel that calls it.
+
+Else the process that compiles calls its machine code of its own, and processes that load the caller's stored machine
+code call the copy in there: the compiler may have chosen another rounding for either.
+"""
+
+
 def compiled(function: Function) -> Function:
     """Compile with numba in nopython mode, without the interpreter lock, stored on disk between runs.
 
@@ -23,7 +31,7 @@ def compiled_sums(function: Function) -> Function:
 
     That lets the compiler use vector instructions. Infinities and NaN keep their meaning, unlike with full fastmath.
     """
-    return _compiled(function, fastmath={"contract", "reassoc"})
+    return _compiled(function, fastmath={"contract", "reassoc"}, forceinline=_WITHIN_CALLERS)
 
 
 def compiled_arithmetic(function: Function) -> Function:
@@ -31,7 +39,7 @@ def compiled_arithmetic(function: Function) -> Function:
 
     A test for zero at each division would keep the compiler from using vector instructions.
     """
-    return _compiled(function, error_model="numpy", fastmath={"contract"})
+    return _compiled(function, error_model="numpy", fastmath={"contract"}, forceinline=_WITHIN_CALLERS)
 
 
 class Kernel:
