@@ -103,7 +103,7 @@ print(any("movabs" in line and "5inner" in line and "NumbaEnv" not in line for l
 def test_a_kernel_that_may_round_in_several_ways_is_one_with_the_kernel_that_calls_it(folder, decorator, separate):
     """Else the process that compiles uses another rounding of it than those that load the machine code."""
     statements = "\n".join(
-        f"        total += y[i] * {number}.5 + total * x[i] / {number + 2}.0" for number in range(60)
+        f"        total += y[i] * {number}.5 + total * x[i] / {number + 2}.0" for number in range(25)
     )
     (folder / "kernel_file.py").write_text(NESTED.format(decorator=decorator, statements=statements))
     assert ended(started(folder, program=SYMBOLS))[0] == [separate]

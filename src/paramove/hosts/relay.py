@@ -150,21 +150,13 @@ class Relay:
         self._link = LinkState(hosts=sorted(host for host, peer in settings.peers.items() if peer.commands))
         self._confirmed_ns = 0
         for peer in settings.peers.values():
-            self._await_requests(peer)
+            self._open_requests(peer)
         self._look_due_s = self._detail_due_s = 0.0
         self.detail = ""
         ends: list[Subscriber | Offer | Request | _Answers] = [*self._ends(), *self._offers]
         for end in [*ends, self._answers] if self._answers else ends:
             self._poller.register(end.socket, zmq.POLLIN)
             self._opened.callback(end.close)
-
-    def _await_requests(self, peer: Peer) -> None:
-        """Publishes what persons and programs there request before the first one, which waits for no subscriber."""
-        for name, row in peer.gives.items():
-            if row in topics.AWAY:
-                self._publisher(topics.AWAY[row], _away_name(name, row))
-            elif name in peer.outside:
-                self._publisher(self._topics[name], name)
 
     def __enter__(self) -> Relay:
         return self
@@ -310,6 +302,14 @@ class Relay:
             self._members[answer.node].send_multipart([pack(envelope, payload), payload], zmq.NOBLOCK)
 
     # -- what others give ---------------------------------------------------------------------------------------------
+
+    def _open_requests(self, peer: Peer) -> None:
+        """Opens the topics of persons and programs there: their first message waits for no subscriber here."""
+        for name, row in peer.gives.items():
+            if row in topics.AWAY:
+                self._publisher(topics.AWAY[row], _away_name(name, row))
+            elif name in peer.outside:
+                self._publisher(self._topics[name], name)
 
     def _publish(self, request: Request, host: str, name: str, header: bytes, payload: bytes) -> None:
         topic = self._topics[name]

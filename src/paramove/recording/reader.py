@@ -93,7 +93,8 @@ def _read(path: Path, only: Collection[str], raising: type[InputError], must_be_
 
 def _row(name: str, schema: Schema | None) -> topics.Topic | None:
     """The topic's row of the table, or one by its schema in the recording; None if that cannot be read."""
-    if topics.split_name(name)[1] == topics.TRUTH_VIEW.name:  # what a simulator shows is stored as JPEG
+    # What a simulator shows is stored as JPEG. Other names are not looked up: a table of the user's may be wrong.
+    if name.startswith("truth/") and topics.split_name(name)[1] == topics.TRUTH_VIEW.name:
         return replace(topics.TRUTH_VIEW, name=name, type=topics.CAMERA_IMAGE.type)
     if schema is None:
         return known_row(name)

@@ -49,6 +49,11 @@ def on_bus(launch: Launch, node: str, topic: Topic) -> str:
     return topics.name_on_bus(topic.name, settings.remaps, settings.namespace)
 
 
+def _publishers(launch: Launch, interfaces: Mapping[str, Interface]) -> dict[str, str]:
+    """Name on the bus -> node that publishes it, without statuses."""
+    return {on_bus(launch, name, topic): name for name, its in interfaces.items() for topic in its.publishes}
+
+
 def own_host(file: LaunchFile) -> str | None:
     """Name of the host that the launcher runs on; None where the file has no hosts."""
     return next((name for name, host in file.hosts.items() if host.ssh is None), None)
@@ -64,7 +69,7 @@ def crossing(launch: Launch, interfaces: Mapping[str, Interface]) -> Crossing:
     own = own_host(launch.file) or ""
     host = {name: node.host or own for name, node in launch.file.nodes.items()}
     arming = {name for name, its in launch.file.hosts.items() if (name == own if its.may_arm is None else its.may_arm)}
-    publisher = {on_bus(launch, name, topic): host[name] for name, its in interfaces.items() for topic in its.publishes}
+    publisher = {topic: host[name] for topic, name in _publishers(launch, interfaces).items()}
     found: Crossing = defaultdict(dict)
     for name, interface in interfaces.items():
         for topic in interface.subscribes:
@@ -142,8 +147,8 @@ def distributed(launch: Launch, interfaces: Mapping[str, Interface], keys: HostK
         name: node.model_copy(update={"host": None if node.host == own else node.host})
         for name, node in file.nodes.items()
     }
-    by_nodes = {on_bus(launch, name, topic) for name, its in interfaces.items() for topic in its.publishes}
-    by_nodes |= {topics.status(name).name for name in (*nodes, *map(_relay, file.hosts))}
+    statuses = {topics.status(name).name for name in (*nodes, *map(_relay, file.hosts))}
+    by_nodes = statuses.union(_publishers(launch, interfaces))
     clock = next((nodes[name].host or own for name, its in interfaces.items() if CLOCK in its.publishes), own)
     for name, host in file.hosts.items():
         others = {}
