@@ -116,7 +116,7 @@ def test_a_second_start_names_the_first(start: Start, bus: Bus) -> None:
     second = start()
     _, errors = second.communicate(timeout=60)
     assert second.returncode == 75
-    assert f"status.trivial is already published by pid {first.pid} (trivial)" in errors
+    assert f"status/trivial is already published by pid {first.pid} (trivial)" in errors
     assert "Traceback" not in errors
 
 

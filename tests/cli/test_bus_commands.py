@@ -100,7 +100,8 @@ def test_info_shows_what_was_said(run: Run, speaking: Path) -> None:
 def test_echo_prints_messages_and_ends(run: Run, speaking: Path) -> None:
     result = run("topic", "echo", "gestures", "--count", "2", "--json")
     lines = [json.loads(line) for line in result.output.splitlines()]
-    assert [line["message"] for line in lines] == [{"object": "red"}] * 2
+    assert [line["message"]["object"] for line in lines] == ["red"] * 2
+    assert lines[0]["message"]["confidence"] == 0.0, "a number that is zero is shown"
     assert lines[1]["sequence"] == lines[0]["sequence"] + 1
     assert "--- rules 1, captured at" in run("topic", "echo", "rules", "--count", "1").output
 
@@ -129,7 +130,9 @@ def test_echo_names_the_nearest_part(run: Run, speaking: Path) -> None:
 def test_maps_and_messages_of_a_workspace_are_printed(user_workspace: UserWorkspace) -> None:
     tree = user_workspace.message("Tree")(leaves={"a": 0.5}, colours={"b": 1})
     tree.nests[3].height = 2.0
-    assert readable(tree) == {"leaves": {"a": 0.5}, "colours": {"b": "COLOUR_RED"}, "nests": {"3": {"height": 2.0}}}
+    shown = readable(tree)
+    assert (shown["leaves"], shown["colours"]) == ({"a": 0.5}, {"b": "COLOUR_RED"})
+    assert shown["nests"]["3"]["height"] == 2.0
 
 
 def test_a_wrong_table_of_the_workspace_is_reported_and_not_taken_for_an_unknown_topic(
@@ -283,11 +286,14 @@ def test_node_list_shows_states_and_no_control_characters(run: Run, speaking: Pa
 
 def test_long_bytes_and_enums_are_readable() -> None:
     message = StreamBatch(epoch=3, frames=b"\0" * 56_000)
-    assert readable(message) == {"epoch": 3, "frames": "<56000 bytes>"}
+    assert readable(message).items() >= {"epoch": 3, "frames": "<56000 bytes>"}.items()
     gesture = Gesture(kind=Gesture.KIND_MOVED, x=float("nan"))
     gesture.captured.FromNanoseconds(2_000_000_003)
-    assert readable(gesture) == {"captured": {"seconds": 2, "nanos": 3}, "kind": "KIND_MOVED", "x": "nan"}
-    assert readable(topics.CLOCK.type(published=[{"topic": "a"}])) == {"published": [{"topic": "a"}]}
+    shown = readable(gesture)
+    assert (shown["captured"], shown["kind"], shown["x"]) == ({"seconds": 2, "nanos": 3}, "KIND_MOVED", "nan")
+    assert (shown["y"], shown["object"]) == (0.0, ""), "zeros and empty texts are shown"
+    assert "captured" not in readable(Gesture()), "a message that is not there is not"
+    assert readable(topics.CLOCK.type(published=[{"topic": "a"}]))["published"][0]["topic"] == "a"
 
 
 def test_only_the_called_command_is_imported() -> None:

@@ -110,6 +110,15 @@ message All {
 """
 
 
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [({"kin": "KIND_REST"}, "did you mean 'kind'"), ({"kind": "KIND_REACH"}, "KIND_REST")],
+)
+def test_a_wrong_field_or_value_is_rejected_with_those_that_there_are(content, named):
+    with pytest.raises(InputError, match=named):
+        message_of(RelocationGoal, content)
+
+
 def test_bytes_and_arrays_are_taken_as_they_are(user_workspace):
     kind = user_workspace.message("All", EVERY_KIND)
     fields = {"data": b"\xff\x00raw", "parts": [b"a", bytearray(b"b")], "named": {"c": b"d"}, "x": np.array([1.0, 2.0])}

@@ -109,7 +109,8 @@ class Ownership:
         except BlockingIOError:
             owner = holder_of(path) or "a process that just started"
             os.close(self._lock)
-            raise TopicTakenError(f"{path.name} is already published by {owner}; a topic has one publisher") from None
+            topic = path.name.replace(".", "/")
+            raise TopicTakenError(f"{topic} is already published by {owner}; a topic has one publisher") from None
         except BusFolderError:
             os.close(self._lock)
             raise

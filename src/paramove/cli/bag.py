@@ -86,5 +86,5 @@ def play_file(
     except NoMessageError as error:  # of the clock
         raise ended(str(error), exit_codes.FAILURE) from error
     except TopicTakenError as error:
-        message = f"{error}; a topic has one publisher: name others by --topics, or paramove node stop NAME"
+        message = f"{error}: name other topics by --topics, or leave that node out"
         raise ended(message, exit_codes.TEMPORARY) from error

@@ -20,7 +20,12 @@ app = typer.Typer(name="goal", help="Send the robot a goal.", no_args_is_help=Tr
 
 @app.command()
 def send(
-    content: Annotated[str, typer.Argument(help="a paramove.msgs.RelocationGoal in YAML, such as '{kind: KIND_REST}'")],
+    content: Annotated[
+        str,
+        typer.Argument(
+            help="a paramove.msgs.RelocationGoal in YAML, such as '{kind: KIND_REST, frame: arm_base}' for a servo arm"
+        ),
+    ],
     domain: DomainOption = None,
     namespace: NamespaceOption = None,
     as_json: JsonOption = False,

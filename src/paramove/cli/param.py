@@ -61,7 +61,7 @@ def get(node: NodeArgument, name: NameArgument, domain: DomainOption = None, wai
         raise ended(str(error), exit_codes.USAGE) from error
 
 
-@app.command("set")
+@app.command("set", context_settings={"ignore_unknown_options": True})  # a value may be -1
 def set_value(
     node: NodeArgument,
     name: NameArgument,

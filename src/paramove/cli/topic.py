@@ -182,7 +182,8 @@ def pub(
     except KeyboardInterrupt:
         return
     except TopicTakenError as error:
-        raise ended(f"{error}; a topic has one publisher: paramove node stop NAME", exit_codes.TEMPORARY) from error
+        remedy = "leave the node that publishes it out, by an overlay with `external` (docs/how-to/ros2_verbs.md)"
+        raise ended(f"{error}: {remedy}", exit_codes.TEMPORARY) from error
     except NoMessageError as error:  # of the clock
         raise ended(str(error), exit_codes.FAILURE) from error
     except ValueError as error:  # too large
@@ -267,8 +268,10 @@ def _measured(names: list[str] | None, domain: str | None, seconds: float) -> li
 
 
 def readable(message: Any) -> dict[str, Any]:
-    """A message as JSON values; long byte fields only by their length."""
-    return {field.name: _json_value(field, value) for field, value in message.ListFields()}
+    """A message as JSON values, zeros as well; long byte fields only by their length."""
+    fields = message.DESCRIPTOR.fields
+    there = [field for field in fields if not field.has_presence or message.HasField(field.name)]
+    return {field.name: _json_value(field, getattr(message, field.name)) for field in there}
 
 
 def _json_value(field: Any, value: Any) -> Any:

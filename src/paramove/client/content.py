@@ -11,7 +11,7 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor  # type: igno
 from google.protobuf.json_format import ParseDict, ParseError  # type: ignore[import-untyped]
 
 from paramove.bus import unsound, value_of
-from paramove.documents import InputError, read_value
+from paramove.documents import InputError, nearest, read_value
 
 DEEPEST = 100
 """Messages within each other: as many as protobuf reads."""
@@ -43,10 +43,13 @@ def _in_json(descriptor: Descriptor, fields: Mapping[str, Any], path: str) -> di
     if path.count(".") >= DEEPEST:
         raise InputError(f"messages lie in each other more than {DEEPEST} deep: {path[:60]}…")
     known = {name: field for field in descriptor.fields for name in (field.name, field.json_name)}
-    return {
-        str(name): _value_in_json(known[name], value, f"{path}{name}") if name in known else value
-        for name, value in fields.items()
-    }
+    in_json = {}
+    for name, value in fields.items():
+        if name not in known:
+            hint = nearest(str(name), [field.name for field in descriptor.fields])
+            raise InputError(f"a {descriptor.full_name} has no field '{path}{name}'; {hint}")
+        in_json[str(name)] = _value_in_json(known[name], value, f"{path}{name}")
+    return in_json
 
 
 def _value_in_json(field: FieldDescriptor, value: Any, path: str) -> Any:
@@ -60,6 +63,8 @@ def _value_in_json(field: FieldDescriptor, value: Any, path: str) -> Any:
             return {name: _value_in_json(kind, part, path) for name, part in value.items()}
         is_json_itself = kind.message_type is None or kind.message_type.full_name.startswith("google.")
         return value if is_json_itself else _in_json(kind.message_type, value, f"{path}.")
+    if kind.enum_type is not None and isinstance(value, str) and value not in kind.enum_type.values_by_name:
+        raise InputError(f"{path} has no value '{value}'; there are: {', '.join(kind.enum_type.values_by_name)}")
     return _base64(value, path) if kind.type == FieldDescriptor.TYPE_BYTES else value
 
 
