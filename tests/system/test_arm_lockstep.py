@@ -1,4 +1,7 @@
-"""A servo arm in simulated time: the same driver, protocol and servos, and the same run again."""
+"""A servo arm in simulated time: the same driver, protocol and servos, and the same run again.
+
+Two such arms in one run are in test_two_arms.py, among the tests of every day.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import pytest
 
 from paramove.recording import read
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 TOPICS = (
     "arm/joint_states",
     "arm/trajectory",
@@ -36,10 +39,8 @@ def run(launcher, name, *arguments):
 
 @pytest.mark.parametrize(
     "arm",
-    [
-        ("--with", "lockstep"),
-        pytest.param(("--with", "koch", "--with", "lockstep", "--robot", "koch_v1_1"), marks=pytest.mark.long),
-    ],
+    [("--with", "lockstep"), ("--with", "koch", "--with", "lockstep", "--robot", "koch_v1_1")],
+    ids=["open_manipulator_x", "koch_v1_1"],
 )
 def test_a_run_in_lockstep_is_repeatable(launcher, tmp_path, arm):
     launcher.folder = tmp_path / "runs"

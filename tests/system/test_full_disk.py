@@ -9,7 +9,7 @@ from tests.recording.small_disk import fill, small_disk
 from tests.system.test_connect_your_arm import EMULATED, heard
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_run_goes_on_over_a_full_disk_and_the_recording_after_it(launcher, tmp_path):
     with small_disk(tmp_path / "disk", 200) as launcher.folder:
         process = launcher.start(*EMULATED.split()[2:], "--headless")
