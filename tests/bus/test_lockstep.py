@@ -16,6 +16,7 @@ from paramove.bus.barrier import LockstepBarrier
 from paramove.bus.bus import Bus
 from paramove.bus.lockstep import from_marks
 from paramove.bus.settings import BusSettings
+from paramove.documents import InputError
 from paramove.msgs.clock_pb2 import TickDone
 from paramove.msgs.rule_pb2 import Speech
 from paramove.msgs.tracked_objects_pb2 import TrackedObjects
@@ -181,6 +182,15 @@ def test_only_the_bus_that_says_the_clock_sets_the_time(folder: Path) -> None:
             bus.keep_time(1)
         with pytest.raises(RuntimeError, match="LockstepBarrier"):
             next(bus.events())
+
+
+def test_simulated_time_in_a_run_with_the_time_of_the_machine_is_rejected(folder: Path) -> None:
+    settings = BusSettings(folder=folder, begun_ns=5)
+    with (
+        Bus("world", settings, (), (topics.CLOCK,)) as bus,
+        pytest.raises(InputError, match="clock: simulated"),
+    ):
+        bus.keep_time(1)
 
 
 def test_without_lockstep_the_clock_is_said_and_nobody_is_waited_for(folder: Path, wait: Wait) -> None:

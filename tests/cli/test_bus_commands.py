@@ -76,7 +76,12 @@ def test_without_a_bus_the_commands_say_so(run: Run) -> None:
 
 
 def test_list_shows_who_says_what(run: Run, speaking: Path) -> None:
-    rows = {row["topic"]: row for row in json.loads(run("topic", "list", "--json").output)}
+    assert [row["topic"] for row in json.loads(run("topic", "list", "--json").output)] == [
+        "gestures",
+        "rules",
+        "status/recognizer",
+    ]
+    rows = {row["topic"]: row for row in json.loads(run("topic", "list", "--all", "--json").output)}
     assert rows["gestures"]["publisher"] == f"pid {os.getpid()} (recognizer)"
     assert rows["camera/image"]["publisher"] == rows["camera/image"]["said by"] == "none"
     assert rows["status/recognizer"]["type"] == "paramove.msgs.NodeStatus"
@@ -166,6 +171,7 @@ def test_type_and_interface_show_what_a_topic_carries(run: Run, user_workspace: 
         "message foxglove.Quaternion {",
     ):
         assert f"{line}\n" in shown
+    assert run("interface", "show", "Gesture").output == run("interface", "show", "/gestures").output
     wrong = run("interface", "show", f"{package}.Tre")
     assert wrong.exit_code == 2
     assert f"did you mean '{package}.Tree'?" in wrong.output
@@ -183,6 +189,7 @@ def test_pub_publishes_once_with_a_subscriber(run: Run, speaking: Path) -> None:
     received = received_while(speaking, [topics.SPEECH], publish)
     assert [one.exit_code for one in done] == [0, 0], [one.output for one in done]
     assert {one.message.text for one in received} == {"hello", "again"}
+    assert [one.output for one in done] == ["speech: published 1 message\n", "speech: published 3 messages\n"]
 
 
 @pytest.mark.parametrize(

@@ -71,6 +71,7 @@ def test_alone_it_is_an_application_of_one_node(folder):
     ("words", "message"),
     [
         (("nodes.anouncer",), "announcer"),
+        (("announcer",), "did you mean nodes.announcer?"),
         (("nodes.announcer",), "'times' is missing"),
         (("nodes.announcer", "--set", "times=x"), "times: input should be a valid integer"),
         (("nodes.announcer", "--set", "tmes=1"), "did you mean 'times'?"),

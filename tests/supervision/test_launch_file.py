@@ -54,6 +54,12 @@ def test_overlays_given_replace_the_default_one_and_may_add_and_remove_nodes(fol
     assert parameters(launch)["rate_hz"] == 15
 
 
+def test_an_overlay_that_leaves_out_a_node_that_there_is_not_names_the_nearest(folder):
+    (folder / "overlays" / "typo.yaml").write_text("nodes: {wrld: null}\n")
+    with pytest.raises(DocumentError, match=r"typo\.yaml:1:9: there is no node 'wrld'.* did you mean 'world'"):
+        load(folder, "good", ["typo"])
+
+
 def test_settings_come_last_and_are_yaml(folder):
     launch = load(folder, "good", None, ["camera.rate_hz=7.5", "camera.lens.k2=[1, 2]", "camera.name=left: eye"[:16]])
     assert parameters(launch) == {"rate_hz": 7.5, "lens": {"k1": 0.3, "k2": [1, 2]}, "name": "left"}

@@ -21,6 +21,7 @@ from paramove.bus.status import StatusReporter
 from paramove.bus.subscriber import Received
 from paramove.bus.ticks import ExternalClock, RealTimeTicks, SimulatedTicks, Tick, TickSource
 from paramove.bus.topics import Topic
+from paramove.documents import InputError
 from paramove.msgs.node_status_pb2 import NodeStatus
 
 _log = logging.getLogger(__name__)
@@ -284,10 +285,18 @@ class Bus:
         return [] if keep else self.exchange.take(self._subscribed, marks)
 
     def keep_time(self, now_ns: int) -> None:
-        """Sets the time, on the bus that publishes `clock`; raises RuntimeError on others or if time ran backwards."""
+        """Sets the time, on the bus that publishes `clock`; raises RuntimeError on others or if time ran backwards.
+
+        InputError for the time of a simulation in a run with the time of this machine.
+        """
         if not isinstance(self._ticks, ExternalClock):
             raise RuntimeError(f"{self.node} does not publish {topics.CLOCK.name}, so it cannot set the time")
         if now_ns < self._ticks.now_ns:
+            if self.settings.clock == "monotonic":
+                raise InputError(
+                    f"{self.node} simulates time, but the clock of this run is that of the machine; start it by a "
+                    "launch file with 'bus: {clock: simulated}'"
+                )
             raise RuntimeError(f"time would run back from {self._ticks.now_ns} ns to {now_ns} ns")
         self._ticks.now_ns = now_ns
 

@@ -375,13 +375,16 @@ class UnknownTopicError(InputError):
 
 
 def named(name: str | Topic) -> Topic:
-    """As `by_name`, for a name that a person has written, or a row; raises UnknownTopicError, and what `own` raises."""
+    """As `by_name`, for a name that a person has written, or a row; raises UnknownTopicError, and what `own` raises.
+
+    A slash before the name, which ROS writes, is left out.
+    """
     if isinstance(name, Topic):
         return name
     if not isinstance(name, str):
         raise UnknownTopicError(f"expected the name of a topic, such as 'arm/joint_states', found {name!r:.80}")
     try:
-        return by_name(name)
+        return by_name(name.removeprefix("/"))
     except InputError:  # of the workspace's table
         raise
     except (KeyError, ValueError) as error:

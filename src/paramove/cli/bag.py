@@ -18,7 +18,13 @@ from paramove.recording import contents
 
 app = typer.Typer(name="bag", help="Look into a recording, or play it on a bus.", no_args_is_help=True)
 
-FileArgument = Annotated[Path, typer.Argument(help="recording.mcap of a run folder")]
+
+def _recording(path: Path) -> Path:
+    """The recording in a run folder, or the file itself."""
+    return path / "recording.mcap" if path.is_dir() else path
+
+
+FileArgument = Annotated[Path, typer.Argument(help="run folder, or its recording.mcap", callback=_recording)]
 
 
 @app.command()
@@ -74,8 +80,10 @@ def play_file(
     topics; 78 it has no such topic, or that is not played.
     """
     names = [name for name in topics.split(",") if name]
+    folder = default_folder(domain)
+    typer.echo(f"plays {file}; from another terminal: paramove topic hz --domain {folder.name}")
     try:
-        with one_line(), Run(default_folder(domain), "paramove bag play") as run:
+        with one_line(), Run(folder, "paramove bag play") as run:
             for number in itertools.count():
                 count = play(run, file, names, rate, start_s, wait_s if number == 0 else 0.0)
                 typer.echo(f"played {count} messages")

@@ -22,7 +22,7 @@ def list_types() -> None:
 
 @app.command()
 def show(
-    name: Annotated[str, typer.Argument(help="type such as paramove.msgs.Gesture, or a topic such as gestures")],
+    name: Annotated[str, typer.Argument(help="type such as Gesture, or a topic such as gestures")],
 ) -> None:
     """Print the fields of a message, and of the messages in it, as in a `.proto` file.
 
@@ -31,7 +31,10 @@ def show(
     with one_line():
         types = message_types()
         by_topic = {topic.name: topic.type for topic in topics.TOPICS}
-    kind = types.get(name) or by_topic.get(name)
+    by_last_part = {full: kind for full, kind in types.items() if full.rpartition(".")[2] == name}
+    if len(by_last_part) > 1:
+        raise ended(f"which {name}? {', '.join(by_last_part)}", exit_codes.USAGE)
+    kind = types.get(name) or by_topic.get(name.removeprefix("/")) or next(iter(by_last_part.values()), None)
     if kind is None:
         raise ended(f"there is no type or topic '{name}'; {nearest(name, [*types, *by_topic])}", exit_codes.USAGE)
     typer.echo(written_out(kind.DESCRIPTOR))

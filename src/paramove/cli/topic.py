@@ -35,8 +35,12 @@ LONGEST_BYTES = 32
 
 
 @app.command("list")
-def list_topics(domain: DomainOption = None, as_json: JsonOption = False) -> None:
-    """List every topic, its type and its publisher."""
+def list_topics(
+    domain: DomainOption = None,
+    as_json: JsonOption = False,
+    every: Annotated[bool, typer.Option("--all", help="those that nobody publishes, too")] = False,
+) -> None:
+    """List the topics that are published, their types and their publishers."""
     rows = [
         {
             "topic": item.topic.name,
@@ -47,6 +51,7 @@ def list_topics(domain: DomainOption = None, as_json: JsonOption = False) -> Non
             "publisher": item.holder if item.alive else "none",
         }
         for item in inspection.publishers(bus_folder(domain))
+        if item.alive or every
     ]
     show(rows, as_json)
 
@@ -159,6 +164,7 @@ def pub(
         float | None, typer.Option("--rate", min=0.01, max=1000.0, help="again and again, until Ctrl-C")
     ] = None,
     count: Annotated[int | None, typer.Option(min=1, help="with --rate: end after so many")] = None,
+    once: Annotated[bool, typer.Option("--once", help="one message, as without --rate")] = False,
     wait_s: Annotated[float, typer.Option("--wait", min=0.0, metavar="SECONDS", help="for a first subscriber")] = 2.0,
 ) -> None:
     """Publish a message, once or at a rate, on a topic that nobody else publishes.
@@ -170,17 +176,18 @@ def pub(
     nodes or persons.
     """
     topic = topic_named(name)
-    subscribers = False
+    most = 1 if once else count
+    number, subscribers = 0, False
     try:
         with one_line(), connect(domain, "paramove topic pub") as run:
             message = message_of(topic.type, content)
             for number in itertools.count(1):
                 subscribers = run.publish(topic.name, message, wait_s if number == 1 else 0.0)
-                if rate_hz is None or number == count:
+                if rate_hz is None or number == most:
                     break
                 run.idle(1 / rate_hz)
     except KeyboardInterrupt:
-        return
+        pass
     except TopicTakenError as error:
         remedy = "leave the node that publishes it out, by an overlay with `external` (docs/how-to/ros2_verbs.md)"
         raise ended(f"{error}: {remedy}", exit_codes.TEMPORARY) from error
@@ -188,8 +195,9 @@ def pub(
         raise ended(str(error), exit_codes.FAILURE) from error
     except ValueError as error:  # too large
         raise ended(str(error), exit_codes.CONFIGURATION) from error
-    if not subscribers:
+    if number and not subscribers:
         raise ended(f"{topic.name}: published, but nobody subscribed within {wait_s:g} s", exit_codes.FAILURE)
+    typer.echo(f"{topic.name}: published {number} message{'' if number == 1 else 's'}")
 
 
 @app.command()

@@ -234,7 +234,7 @@ class Run:
         Raises NoMessageError if one has not answered in time: then nobody knows that its arm stops. TopicTakenError as
         `stop_arms` does.
         """
-        answers = stop_arms(self._folder, self.name, timeout_s)
+        answers = stop_arms(self._folder, f"program {self.name}", timeout_s)
         answered = {namespace: answer for namespace, answer in answers.items() if answer is not None}
         if silent := [namespace for namespace in answers if namespace not in answered]:
             whose = f" of {', '.join(silent)}" if any(silent) else ""

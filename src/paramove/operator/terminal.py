@@ -63,7 +63,7 @@ def stop_arms(folder: Path, source: str, timeout_s: float) -> dict[str, SafetySt
 
     Args:
         folder: Of the run's bus.
-        source: Where the person pressed, for the message of the fault that the gate latches.
+        source: Where the person pressed, or "program NAME", for the message of the fault that the gate latches.
         timeout_s: To wait for the gates' answers.
 
     Returns:

@@ -25,12 +25,14 @@ class Edge:
         rate_hz: Nominal or measured; None where messages come with events.
         publishers: Nodes; none where a topic has subscribers only.
         subscribers: Nodes.
+        is_from_outside: Whether persons, or programs outside of the run, publish it.
     """
 
     topic: str
     rate_hz: float | None
     publishers: tuple[str, ...]
     subscribers: tuple[str, ...]
+    is_from_outside: bool = False
 
     @property
     def label(self) -> str:
@@ -66,8 +68,8 @@ class Graph:
 
     @property
     def unpublished(self) -> list[Edge]:
-        """Topics with subscribers and no publisher."""
-        return [edge for edge in self.edges if not edge.publishers]
+        """Topics with subscribers and no publisher, that no person or program outside of the run publishes either."""
+        return [edge for edge in self.edges if not edge.publishers and not edge.is_from_outside]
 
 
 def graph_of(launch: Launch, interfaces: Mapping[str, Interface]) -> Graph:
@@ -84,7 +86,7 @@ def graph_of(launch: Launch, interfaces: Mapping[str, Interface]) -> Graph:
     modules = {name: launch.file.nodes[name].module for name in interfaces}
     title = " with ".join([launch.name, *([", ".join(launch.overlays)] if launch.overlays else [])])
     to_all = {CLOCK.name} if launch.file.bus.clock == "simulated" else set()
-    return _graph(title, modules, publishers, subscribers, rates, to_all)
+    return _graph(title, modules, publishers, subscribers, rates, to_all, launch.file.external)
 
 
 def running_graph(folder: Path, domain: str, seconds: float) -> Graph:
@@ -117,17 +119,30 @@ def _graph(
     subscribers: Mapping[str, list[str]],
     rates: Mapping[str, float | None],
     to_all: Iterable[str],
+    external: Iterable[str] = (),
 ) -> Graph:
     order = {topic.name: index for index, topic in enumerate(topics.TOPICS)}
     names = sorted({*publishers, *subscribers}, key=lambda name: (order.get(name, len(order)), name))
     edges = tuple(
-        Edge(name, rates.get(name), tuple(publishers.get(name, ())), tuple(subscribers.get(name, ()))) for name in names
+        Edge(
+            name,
+            rates.get(name),
+            tuple(publishers.get(name, ())),
+            tuple(subscribers.get(name, ())),
+            name in external or _is_of_persons(name),
+        )
+        for name in names
     )
     collectors = frozenset(node for node in nodes if sum(node in edge.subscribers for edge in edges) >= MANY)
     # A collector subscribes to the topics of every application; those with no other subscriber are of another one.
     edges = tuple(edge for edge in edges if edge.publishers or not collectors.issuperset(edge.subscribers))
     ordered = {node: nodes[node] for node in _flow(list(nodes), edges, collectors)}
     return Graph(title, ordered, edges, collectors, frozenset(to_all))
+
+
+def _is_of_persons(name: str) -> bool:
+    topic = topics.known_by(name)
+    return topic is not None and topic.is_request
 
 
 def _flow(nodes: list[str], edges: Iterable[Edge], collectors: frozenset[str]) -> list[str]:
@@ -183,7 +198,11 @@ def _subscribed(graph: Graph, node: str, width: int) -> Iterator[str]:
         yield f"{len(subscribers)} of {len(graph.edges)} topics"
         return
     for edge in subscribers:
-        yield f"{edge.label:<{width}}  <- {', '.join(edge.publishers) or 'no publisher (!)'}"
+        yield f"{edge.label:<{width}}  <- {', '.join(edge.publishers) or _nobody(edge)}"
+
+
+def _nobody(edge: Edge) -> str:
+    return "from outside" if edge.is_from_outside else "no publisher (!)"
 
 
 def _published(graph: Graph, node: str, width: int) -> Iterator[str]:

@@ -59,6 +59,8 @@ def source_of(module: str, workspace: Workspace) -> Path:
             return Path(spec.origin)
     known = [name for name in workspace.names(relative.parent, "*.py") if not name.startswith("_")]
     neighbours = f"; {relative.parent} has: {', '.join(known)}" if known else ""
+    if "." not in module and module in workspace.names(Path("nodes"), "*.py"):
+        neighbours = f"; did you mean nodes.{module}?"
     raise InterfaceError(
         f"there is no module '{module}' ({relative.with_suffix('.py')}) in {workspace.root}{neighbours}"
     )

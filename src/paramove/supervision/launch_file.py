@@ -161,11 +161,23 @@ def _with_overlays(
     for overlay, path in chosen.items():
         try:
             for top in _overlay(workspace, folders, overlay, path, laid_on):
+                raise_any(list(_left_out_in_vain(document, top)))
                 document = document.overlaid(top)
         except DocumentError as error:
             findings.append(error)
     raise_any(findings)
     return document, list(laid_on)
+
+
+def _left_out_in_vain(document: Document, top: Document) -> Iterator[DocumentError]:
+    """Nodes that an overlay removes from a document without them."""
+    nodes = _mapping_at(document, "nodes")
+    for name, node in _mapping_at(top, "nodes").items():
+        if node is None and name not in nodes:
+            remedy = nearest(name, nodes)
+            if document.data.get("include"):
+                remedy = "a node of an included file is left out by 'include: {NAMESPACE: {without: [NODE]}}'"
+            yield top.error(("nodes", name), f"there is no node '{name}' to leave out; {remedy}")
 
 
 def _default_overlays(

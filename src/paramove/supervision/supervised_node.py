@@ -196,7 +196,10 @@ class SupervisedNode:
             return ""
         last = printable(self.status.detail) or "none"
         if self.state is State.STARTING and now_s >= self._deadline_s:
-            return f"was not ready within {settings.ready_timeout_s:g} s, last message: {last}"
+            return (
+                f"was not ready within {settings.ready_timeout_s:g} s (ready_timeout_s; a busy machine may need more), "
+                f"last message: {last}"
+            )
         if self.state in _AT_WORK and self._no_status_s >= (settings.silent_timeout_s or float("inf")):
             return f"hangs: no status for {settings.silent_timeout_s:g} s, last message: {last}"
         if settings.memory_limit_mb is not None and now_s >= self._measure_due_s:

@@ -55,6 +55,8 @@ MAX_STALL_S = 0.5
 # Batches that came too late make the guard longer, for this trajectory, and so a stop as much later.
 GUARD_STEP_MS = 70
 LONGEST_GUARD_MS = 240
+PROGRAM = "program "
+"""The source of a stop begins so where no person pressed."""
 TICKS_PER_PROGRESS = 5
 
 
@@ -178,7 +180,9 @@ class ArmDriver:
             message: The request; its time does not count.
             resent: Whether it was published before the driver had subscribed (see `Received.resent`).
         """
-        fault = Fault(PERSON_STOP, "", f"stopped from the {message.source or 'bus'} by a person")
+        source = message.source or "bus"
+        whose = "" if source.startswith(PROGRAM) else " by a person"
+        fault = Fault(PERSON_STOP, "", f"stopped from the {source}{whose}")
         self._person_stops.append((fault, resent))
 
     def on_link(self, message: LinkState, captured_ns: int) -> None:
