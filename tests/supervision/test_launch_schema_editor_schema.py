@@ -14,12 +14,12 @@ from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 LAUNCH = ROOT / "launch"
-OURS = [*sorted(LAUNCH.glob("*.yaml")), *sorted(LAUNCH.glob("overlays/*.yaml"))]
+OURS = [*sorted(LAUNCH.glob("*.yaml")), *sorted(LAUNCH.glob("overlays/**/*.yaml"))]
 KINDS = {"object": dict, "array": list, "string": str, "boolean": bool, "null": type(None)}
 
 
 def kind_of(path):
-    return "overlay" if path.parent.name == "overlays" else "launch"
+    return "overlay" if "overlays" in path.relative_to(LAUNCH).parts else "launch"
 
 
 def conforms(value, schema, root):
@@ -29,6 +29,10 @@ def conforms(value, schema, root):
     if "$ref" in schema and not conforms(value, root["$defs"][schema["$ref"].removeprefix("#/$defs/")], root):
         return False
     if "anyOf" in schema and not any(conforms(value, choice, root) for choice in schema["anyOf"]):
+        return False
+    if "not" in schema and conforms(value, schema["not"], root):
+        return False
+    if "if" in schema and conforms(value, schema["if"], root) and not conforms(value, schema["then"], root):
         return False
     if "enum" in schema and value not in schema["enum"]:
         return False
@@ -71,7 +75,7 @@ def is_type(value, kind):
 
 KEYWORDS = {"$schema", "title", "description", "default", "$defs", "$ref", "anyOf", "enum", "type", "pattern"}
 KEYWORDS |= {"maxLength", "minimum", "exclusiveMinimum", "maximum", "items", "required", "properties"}
-KEYWORDS |= {"additionalProperties", "patternProperties", "propertyNames", "minProperties"}
+KEYWORDS |= {"additionalProperties", "patternProperties", "propertyNames", "minProperties", "not", "if", "then"}
 
 
 @pytest.mark.parametrize("kind", FILES)
@@ -127,6 +131,13 @@ def test_schema_refuses_what_the_launcher_refuses(text):
         validated(document)
     schema = editor_schema("launch")
     assert not conforms(document.data, schema, schema)
+
+
+def test_a_node_that_may_lie_over_an_included_one_needs_no_module():
+    schema = editor_schema("launch")
+    nodes = {"left_reacher": {"parameters": {"tasks": []}}}
+    assert conforms({"include": {"left": {"launch": "dynamixel_arm"}}, "nodes": nodes}, schema, schema)
+    assert not conforms({"nodes": nodes}, schema, schema)
 
 
 def test_an_overlay_may_leave_out_remove_and_lie_over_others_but_has_no_default_ones():

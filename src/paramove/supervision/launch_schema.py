@@ -190,6 +190,10 @@ def _launch() -> dict[str, Any]:
     for model in (schema, *schema["$defs"].values()):
         del model["title"]  # the name of its class
     schema["properties"]["nodes"]["additionalProperties"] = False  # names that do not fit the pattern
+    # What a file that includes others sets of a node may be laid over one of theirs, which has a module.
+    needed = schema["$defs"]["NodeSettings"].pop("required")
+    schema["if"] = {"not": {"required": ["include"]}}
+    schema["then"] = {"properties": {"nodes": {"patternProperties": {"": {"required": needed}}}}}
     return {"$schema": DIALECT, "title": "paramove launch file", **schema}
 
 
@@ -197,6 +201,7 @@ def _overlay() -> dict[str, Any]:
     """The launch file's schema with every key optional; null removes a key of the file below."""
     schema = _launch()
     schema["title"] = "paramove overlay"
+    del schema["if"], schema["then"]
     schema["description"] = "Laid over a launch file: mappings merge, all else is replaced, null removes a key."
     schema["properties"]["over"] = schema["properties"].pop("default_overlays")
     schema["properties"]["over"]["description"] = "overlays that are laid below this one, if they are not yet"

@@ -19,7 +19,7 @@ def estop(domain: DomainOption = None) -> None:
 
     Exit codes: 0 every safety gate has answered; 69 one has not within 1 s.
     """
-    from paramove.bus import BusFolderError, TopicTakenError, default_folder
+    from paramove.bus import BusFolderError, TopicTakenError, default_folder, inspection
     from paramove.msgs.safety_state_pb2 import SafetyState
     from paramove.operator import stop_arms
     from paramove.safety import PERSON_STOP
@@ -42,4 +42,5 @@ def estop(domain: DomainOption = None) -> None:
         typer.echo(f"{gate} has received it: {state}, {message}")
     if silent:
         has = "has answered" if silent == ["no safety gate"] else "has not answered"
-        raise ended(f"{', '.join(silent)} {has} within {TIMEOUT_S:g} s; {REAL_ONE}", exit_codes.UNAVAILABLE)
+        nobody = "" if inspection.gates(folder) else ", and no driver of an arm runs here (any more)"
+        raise ended(f"{', '.join(silent)} {has} within {TIMEOUT_S:g} s{nobody}; {REAL_ONE}", exit_codes.UNAVAILABLE)
