@@ -81,7 +81,7 @@ setup: ## installs what is missing; done by the others too
 messages: setup ## generates src/paramove/msgs from msgs/*.proto
 	$(BIN)/python msgs/generate.py
 
-lock: ## finds newer versions and writes requirements.lock and requirements-peers.lock
+lock: ## finds newer versions and writes requirements.lock, and those of the extras peers and ros2
 	python3 -m venv build/lock
 	build/lock/bin/python -m pip install --quiet uv
 	build/lock/bin/uv pip compile pyproject.toml --extra robot --extra c3d --extra dev --extra docs --universal --python-version 3.11 --upgrade \
@@ -90,6 +90,9 @@ lock: ## finds newer versions and writes requirements.lock and requirements-peer
 	build/lock/bin/uv pip compile pyproject.toml --extra peers --extra cluster --universal --python-version 3.11 --upgrade \
 	  --constraint requirements.lock --generate-hashes --no-emit-index-url --no-emit-find-links \
 	  --custom-compile-command "make lock" --output-file requirements-peers.lock
+	build/lock/bin/uv pip compile pyproject.toml --extra ros2 --universal --python-version 3.11 --upgrade \
+	  --constraint requirements.lock --generate-hashes --no-emit-index-url --no-emit-find-links \
+	  --custom-compile-command "make lock" --output-file requirements-ros2.lock
 
 bare: ## demo and tests in a bare Debian, as root and as an ordinary user (needs root and debootstrap)
 	docker/bare.sh $(ARGS)

@@ -153,7 +153,8 @@ def test_files_are_small():
 
 
 def test_lock_pins_every_dependency_with_hashes():
-    lock = "".join((ROOT / name).read_text() for name in ("requirements.lock", "requirements-peers.lock"))
+    names = ("requirements.lock", "requirements-peers.lock", "requirements-ros2.lock")
+    lock = "".join((ROOT / name).read_text() for name in names)
     pinned = {match.lower() for match in re.findall(r"^([A-Za-z0-9_.-]+)==\S+", lock, re.M)}
     project = (ROOT / "pyproject.toml").read_text()
     wanted = set(re.findall(r'^    "([A-Za-z0-9_.-]+)[><=]', project, re.M)) | {"hatchling"}

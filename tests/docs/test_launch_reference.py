@@ -45,9 +45,11 @@ def type_of(field):
 
 
 SCHEMA = editor_schema("launch")
+OF_A_NODE = SCHEMA["then"]["properties"]["nodes"]["patternProperties"][""]
+"""What a node needs in a file that includes no other."""
 MODELS = {
     "launch file": SCHEMA,
-    "node": SCHEMA["$defs"]["NodeSettings"],
+    "node": SCHEMA["$defs"]["NodeSettings"] | OF_A_NODE,
     "included file": SCHEMA["$defs"]["IncludedFile"],
     "bus": SCHEMA["$defs"]["BusSettings"],
     "budget": SCHEMA["$defs"]["RestartBudget"],

@@ -1,0 +1,45 @@
+"""An arm in ROS 2: a program that knows ROS and not paramove reads its joints, sends it a goal and stops it."""
+
+import importlib.util
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.docs.terminal import heard
+
+PROGRAM = Path(__file__).with_name("ros2_program.py")
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        importlib.util.find_spec("rclpy") is None, reason="not installed: rclpy (pip install 'paramove[ros2]')"
+    ),
+]
+
+
+def test_a_program_of_ros_reads_the_joints_sends_a_goal_and_stops_the_arm(launcher):
+    launcher.environment["ROS_DOMAIN_ID"] = "83"
+    run = launcher.start(
+        "dynamixel_arm", "--with", "emulated", "--with", "external_goals", "--with", "ros2", "--headless"
+    )
+    command = [sys.executable, PROGRAM, "arm_base", "0.18", "0.05", "0.10"]
+    program = subprocess.run(
+        command, env=launcher.environment, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert program.returncode == 0, program.stderr
+    joints, goal, stopped, _ = map(json.loads, program.stdout.splitlines())
+    assert joints["joints"] == ["joint1", "joint2", "joint3", "joint4", "gripper"]
+    assert len(joints["positions"]) == 5
+    assert -0.1 < joints["age_s"] < 5.0, "the stamp is of the system's clock"
+    assert goal == {"state": "SUCCEEDED", "reason": ""}
+    assert stopped["faults"] == {"person_stop": "stopped from the program paramove of ROS 2"}
+    run.send_signal(signal.SIGINT)
+    heard(run, "interrupted by Ctrl-C")
+    assert run.wait(60) == 130
+    events = [json.loads(line) for line in (launcher.latest / "events.jsonl").read_text().splitlines()]
+    (ended,) = [event for event in events if event["event"] == "ended" and event.get("node") == "ros2"]
+    assert ended["code"] == 0
