@@ -38,8 +38,8 @@ def test_a_program_of_ros_reads_the_joints_sends_a_goal_and_stops_the_arm(launch
     assert goal == {"state": "SUCCEEDED", "reason": ""}
     assert stopped["faults"] == {"person_stop": "stopped from the program paramove of ROS 2"}
     run.send_signal(signal.SIGINT)
-    heard(run, "interrupted by Ctrl-C")
+    heard(run, "stopped by Ctrl-C")
     assert run.wait(60) == 130
     events = [json.loads(line) for line in (launcher.latest / "events.jsonl").read_text().splitlines()]
     (ended,) = [event for event in events if event["event"] == "ended" and event.get("node") == "ros2"]
-    assert ended["code"] == 0
+    assert ended["exit_code"] == 0
