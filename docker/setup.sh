@@ -85,6 +85,11 @@ say "installs the Python packages of requirements.lock into .venv (about 1 GB; m
 .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile --require-hashes --only-binary :all: \
     --requirement requirements.lock
 .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+if [ -n "${PYTHONDONTWRITEBYTECODE:-}" ]; then
+    # Images of containers often set it. Nothing would be kept then, and each process compiles all that it imports: a second of a processor.
+    say "compiles the Python modules, as PYTHONDONTWRITEBYTECODE lets no process keep what it has compiled"
+    .venv/bin/python -m compileall -q -j 0 -x '/tests/' .venv/lib src nodes sim >/dev/null || : # some packages hold files of no Python
+fi
 
 # --- Does it draw? ---------------------------------------------------------------------------------------------------
 draws() {
