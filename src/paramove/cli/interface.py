@@ -24,7 +24,7 @@ def list_types() -> None:
 def show(
     name: Annotated[str, typer.Argument(help="type such as Gesture, or a topic such as gestures")],
 ) -> None:
-    """Print the fields of a message, and of the messages in it, as in a `.proto` file.
+    """Print the fields of a message, and of the messages in it, as in a `.proto` file, after the name of that file.
 
     Exit codes: 0 done; 2 there is no such type or topic; 78 a file of this folder is wrong.
     """
@@ -37,4 +37,4 @@ def show(
     kind = types.get(name) or by_topic.get(name.removeprefix("/")) or next(iter(by_last_part.values()), None)
     if kind is None:
         raise ended(f"there is no type or topic '{name}'; {nearest(name, [*types, *by_topic])}", exit_codes.USAGE)
-    typer.echo(written_out(kind.DESCRIPTOR))
+    typer.echo(f"// {kind.DESCRIPTOR.file.name}\n{written_out(kind.DESCRIPTOR)}")
