@@ -270,7 +270,7 @@ def test_a_dead_and_a_busy_speaker_are_shown_as_such(run: Run, speaking: Path) -
     try:
         started[0].kill()
         started[0].wait()
-        rows = {row["topic"]: row for row in json.loads(run("topic", "list", "--json").output)}
+        rows = {row["topic"]: row for row in json.loads(run("topic", "list", "--all", "--json").output)}
         assert rows["speech"]["publisher"] == "none"
         assert rows["clock"]["publisher"] == f"pid {started[1].pid} (busy)"
         hz = json.loads(run("topic", "hz", "clock", "--seconds", "0.2", "--json").output)[0]

@@ -57,17 +57,18 @@ def test_data_flows_onwards(sim):
 
 
 def test_a_topic_without_publisher_is_marked(sim):
-    assert {found.topic for found in sim.unpublished} == {
-        "operator/arm",
-        "operator/stop",
-        "operator/estop",
-        "action/estimate",
-        "human/arm_pose",
-    }
-    assert "operator/stop             <- no publisher (!)" in as_text(sim)
+    assert {found.topic for found in sim.unpublished} == {"action/estimate", "human/arm_pose"}
+    assert "human/arm_pose            <- no publisher (!)" in as_text(sim)
     assert "Subscribed, no publisher:" in as_text(sim)
-    assert "operator/stop: no publisher" in as_mermaid(sim)
+    assert "human/arm_pose: no publisher" in as_mermaid(sim)
     assert "no publisher</text>" in as_svg(sim)
+
+
+def test_a_topic_of_persons_comes_from_outside(sim):
+    assert {found.topic for found in sim.from_outside} == {"operator/arm", "operator/stop", "operator/estop"}
+    assert "operator/stop             <- from outside" in as_text(sim)
+    assert "operator/stop: from outside" in as_mermaid(sim)
+    assert "from outside</text>" in as_svg(sim)
 
 
 def test_text_fits_a_terminal_and_tells_every_topic(sim):

@@ -112,7 +112,8 @@ nodes:
 """)
     outcome, _, _ = workspace.run()
     assert outcome.code == exit_codes.FAILURE
-    assert "slow was not ready within 6 s, last message: warming up the lamp" in outcome.reason
+    assert "slow was not ready within 6 s (ready_timeout_s" in outcome.reason
+    assert "last message: warming up the lamp" in outcome.reason
 
 
 def test_required_node_that_ends_early_ends_the_run_as_a_failure(workspace):

@@ -1,6 +1,7 @@
 """The wheel by itself, in an empty folder: it carries the workspace, and its core needs nothing of the extras."""
 
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -72,8 +73,9 @@ def test_an_application_of_ones_own_runs_and_its_recording_is_played(installed, 
     recording = "runs/latest/recording.mcap"
     assert "cart/state" in paramove(folder, "bag", "info", recording)
     played = paramove(folder, "bag", "play", recording, "--topics", "cart/state", "--rate", "100", "--wait", "0")
-    assert played.startswith("played ")
-    assert played != "played 0 messages\n"
+    number = re.search(r"^played (\d+) messages$", played, re.M)
+    assert number is not None
+    assert int(number[1]) > 0
 
 
 def test_the_core_trains_recognises_and_synthesises_without_the_extras(core, tmp_path):

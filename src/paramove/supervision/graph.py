@@ -68,8 +68,13 @@ class Graph:
 
     @property
     def unpublished(self) -> list[Edge]:
-        """Topics with subscribers and no publisher, that no person or program outside of the run publishes either."""
+        """Topics with subscribers that nobody publishes."""
         return [edge for edge in self.edges if not edge.publishers and not edge.is_from_outside]
+
+    @property
+    def from_outside(self) -> list[Edge]:
+        """Topics with subscribers that only persons, or programs outside of the run, publish."""
+        return [edge for edge in self.edges if not edge.publishers and edge.is_from_outside]
 
 
 def graph_of(launch: Launch, interfaces: Mapping[str, Interface]) -> Graph:
@@ -232,6 +237,10 @@ def as_mermaid(graph: Graph) -> str:
                 arrow = "-.->" if subscriber in graph.collectors else "-->"
                 label = "<br/>".join(edge.label for edge in edges)
                 lines.append(f'    {_id(publisher)} {arrow}|"{label}"| {_id(subscriber)}')
+    for edge in graph.from_outside:
+        outside = _id(f"outside_{edge.topic}")
+        lines.append(f'    {outside}(["{edge.topic}: from outside"])')
+        lines += [f"    {outside} --> {_id(subscriber)}" for subscriber in _without(edge.subscribers, graph)]
     for edge in graph.unpublished:
         ghost = _id(f"nobody_{edge.topic}")
         lines.append(f'    {ghost}(["{edge.topic}: no publisher"]):::unpublished')

@@ -16,7 +16,8 @@ from paramove.supervision.graph import Edge, Graph
 LETTER_PX = 6.4
 """Width of a letter of the sans-serif at 11 px, on the wide side."""
 LINE_PX, PAD_PX, BOX_PX, MARGIN_PX, TITLE_PX = 14.0, 9.0, 34.0, 16.0, 40.0
-NO_PUBLISHER = "no publisher"
+NO_PUBLISHER, FROM_OUTSIDE = "no publisher", "from outside"
+"""In the place of a node."""
 
 _STYLE = """
     text { font: 11px "DejaVu Sans", Verdana, sans-serif; fill: #1f2933; }
@@ -86,7 +87,9 @@ def as_svg(graph: Graph) -> str:
 
 
 def _laid_out(graph: Graph) -> _Chart:
-    names = [*([NO_PUBLISHER] if graph.unpublished else []), *graph.nodes]
+    nobody = [NO_PUBLISHER] if graph.unpublished else []
+    outside = [FROM_OUTSIDE] if graph.from_outside else []
+    names = [*nobody, *outside, *graph.nodes]
     pairs = ((publisher, subscriber) for publisher in names for subscriber in names if publisher != subscriber)
     cells = {pair: lines for pair in pairs if (lines := _written(graph, *pair))}
     boxes = {}
@@ -103,13 +106,12 @@ def _laid_out(graph: Graph) -> _Chart:
 
 def _written(graph: Graph, publisher: str, subscriber: str) -> list[str]:
     """Text of a cell."""
-    if publisher == NO_PUBLISHER:
-        return [
-            edge.label
-            for edge in graph.unpublished
-            if subscriber in edge.subscribers and subscriber not in graph.collectors
-        ]
-    if subscriber == NO_PUBLISHER:
+    if publisher in (NO_PUBLISHER, FROM_OUTSIDE):
+        edges = graph.unpublished if publisher == NO_PUBLISHER else graph.from_outside
+        if subscriber in graph.collectors:
+            return []
+        return [edge.label for edge in edges if subscriber in edge.subscribers]
+    if subscriber in (NO_PUBLISHER, FROM_OUTSIDE):
         return []
     edges = graph.between(publisher, subscriber)
     if subscriber not in graph.collectors:
