@@ -23,6 +23,8 @@ ARM_LENGTHS = (0.3, 1.2)
 SERVO_ARM_LENGTHS = (0.15, 1.2)
 """m; the same of an arm that was led by hand."""
 MAX_MISSED = 0.05
+FAR_OFF = 1e3
+"""Arm lengths; no movement has a target so far away."""
 FINGER = 0.10
 """m; so far the middle of knuckle, index and thumb may stay behind what the index touches."""
 FRAMES = (FRAME, BODY, ARM_BASE)
@@ -90,6 +92,8 @@ def _missed(movement: ReachingMovement) -> float:
             movement.parameter_for(state, reached + 0.01)
             return max(0.0, float(np.linalg.norm(reached[0] - centre)) - FINGER * movement.scale)
         parameter = movement.parameter_for(state, centre)
+        if not np.abs(parameter).max() <= FAR_OFF:  # rounding has made a singular system solvable
+            raise np.linalg.LinAlgError("no target has an effect")
     except (np.linalg.LinAlgError, UnreachablePoseError) as error:
         raise ValueError("expected a movement that reaches different targets, found one for all") from error
     return float(np.linalg.norm(movement.poses_of_state(state, parameter).gripper[0] - centre))
