@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from benchmarks.fuzz_bus import KINDS, Fuzzer, fuzz, memory_mib
 from paramove.bus import topics
 from paramove.bus.envelope import RejectedError
-from paramove.bus.subscriber import Subscriber
+from paramove.bus.subscriber import Subscriber, decoded
 from tests.bus.conftest import RawPublisher, Wait
 
 
@@ -47,10 +47,8 @@ def test_a_crash_is_told_with_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
 @settings(deadline=None, derandomize=True, max_examples=300)
 @given(st.sampled_from(KINDS), st.binary(max_size=300))
 def test_any_payload_decodes_or_is_refused(kind: Any, payload: bytes) -> None:
-    subscriber = object.__new__(Subscriber)
-    subscriber.topic = topics.Topic("x", kind, None, topics.Profile.QUEUE)
     try:
-        message = subscriber._decode(payload)
+        message = decoded(topics.Topic("x", kind, None, topics.Profile.QUEUE), payload)
     except RejectedError:
         return
     assert type(kind.FromString(message.SerializeToString())) is kind

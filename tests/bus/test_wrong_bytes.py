@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import zmq
 
-from paramove.bus import topics
+from paramove.bus import subscriber, topics
 from paramove.bus.envelope import Reason
 from paramove.bus.schemas import hash_of, schema_hash
 from paramove.bus.subscriber import Received, Subscriber
@@ -166,7 +166,7 @@ def test_a_million_elements_are_refused_before_they_are_decoded(
 ) -> None:
     """2 MB of empty elements would become far more as objects; also the longest of topics refuses them."""
     pair = Pair(context, folder, topics.ARM_TRAJECTORY, wait)
-    monkeypatch.setattr(Subscriber, "_decode", lambda *_: pytest.fail("was decoded"))
+    monkeypatch.setattr(subscriber, "decoded", lambda *_: pytest.fail("was decoded"))
     pair.speaker.say(b"\x1a\x00" * 10**6)
     wait(pair.subscriber.revive, pair.subscriber.receive)
     assert pair.subscriber.counter.rejected == {Reason.CONNECTION: 1}

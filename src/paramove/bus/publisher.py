@@ -14,7 +14,7 @@ from paramove.bus.envelope import FLAG_LAST_VALUE, FLAG_RING, FLAG_WELCOME, Enve
 from paramove.bus.image_ring import SMALLEST, RingWriter
 from paramove.bus.monitor import can_read
 from paramove.bus.schemas import schema_hash
-from paramove.bus.soundness import LATEST_S, impossible_time
+from paramove.bus.soundness import LATEST_S, has_times, impossible_time
 from paramove.bus.topics import Profile, Topic
 
 _NOBLOCK = int(zmq.NOBLOCK)
@@ -68,6 +68,7 @@ class Publisher:
         self._frame = self.name.encode() + b"\0"
         self._schema = schema_hash(topic.type)
         self._publisher = publisher_id(node)
+        self._has_times = has_times(topic.type.DESCRIPTOR)
         self._last: tuple[Envelope, bytes] | None = None
         self._ring = RingWriter() if topic.by_ring else None
         options = {
@@ -148,7 +149,7 @@ class Publisher:
     def _check_times(self, message: Any, envelope: Envelope) -> None:
         if self.topic.is_request:
             return
-        impossible = impossible_time(message)
+        impossible = impossible_time(message) if self._has_times else ""
         if not impossible and not envelope.has_possible_times:
             impossible = f"it is captured at {envelope.captured_ns} ns and published at {envelope.published_ns} ns"
         if impossible:

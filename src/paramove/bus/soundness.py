@@ -37,6 +37,11 @@ def impossible_time(message: Any) -> str:
     return _first(message, True)
 
 
+def has_times(descriptor: Descriptor) -> bool:
+    """Whether messages of a type hold times."""
+    return bool(_checks(descriptor, True))
+
+
 def _first(message: Any, times_only: bool) -> str:
     for check in _checks(message.DESCRIPTOR, times_only):
         reason = check(message)

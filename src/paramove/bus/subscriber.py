@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import logging
 import time
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import zmq
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
@@ -28,7 +27,6 @@ from paramove.msgs.node_status_pb2 import NodeStatus
 _log = logging.getLogger(__name__)
 
 _NOBLOCK = int(zmq.NOBLOCK)
-_RCVMORE = int(zmq.RCVMORE)
 _SKIPPED_AT_ONCE = 200
 """Rejected messages that are read in one call, so that a flood of them does not block the process."""
 
@@ -36,8 +34,7 @@ DEAF_AFTER_S = 0.3
 """A socket that has not tried to reconnect for so long never will."""
 
 
-@dataclass(frozen=True)
-class Received:
+class Received(NamedTuple):
     """One message.
 
     Attributes:
@@ -77,6 +74,11 @@ def decoded(topic: Topic, payload: bytes, numbers: bool = True) -> Any:
     if unsound_number:
         raise RejectedError(Reason.NUMBER, f"{unsound_number}; finite numbers expected, correct the publisher")
     return message
+
+
+def _times_message(envelope: Envelope) -> str:
+    times = f"published at {envelope.published_ns} ns, captured at {envelope.captured_ns} ns"
+    return f"{times}: at most {LATEST_NS} ns expected"
 
 
 def _check_number_of_points(payload: bytes, allowed: int) -> None:
@@ -120,7 +122,7 @@ class Subscriber:
         self._context = context
         self._path = socket_path(folder, self.name)
         self._budget = RateBudget(topic.budget_hz)
-        self._guard = FloodGuard(topic.limit_hz if by_own_clock else None)
+        self._guard = FloodGuard(topic.limit_hz) if by_own_clock and topic.limit_hz is not None else None
         self.cut_off = ""
         self._cut_off_until_s = 0.0
         self._frame = self.name.encode() + b"\0"
@@ -156,16 +158,23 @@ class Subscriber:
             try:
                 if not self._budget.admits(envelope.epoch, envelope.published_ns):
                     raise RejectedError(Reason.BUDGET, self._budget_message())
-                self._check_times(envelope)
-                message = self._decode(payload)
+                if not (envelope.has_possible_times or self.topic.is_request):
+                    raise RejectedError(Reason.NUMBER, _times_message(envelope))
+                message = decoded(self.topic, payload, self.topic.has_checked_numbers)
             except RejectedError as error:
                 self.counter.messages -= 1
                 self._reject(error)
                 if len(payload) > COUNTED_BYTES:  # a stop is looked for before the next one
                     return None
                 continue
-            times = envelope.captured_ns, envelope.published_ns
-            return Received(self.topic, message, *times, envelope.sequence, envelope.is_welcome and is_first)
+            return Received(
+                self.topic,
+                message,
+                envelope.captured_ns,
+                envelope.published_ns,
+                envelope.sequence,
+                resent=envelope.is_welcome and is_first,
+            )
         return None
 
     def receive_raw(self, ready: bool = False) -> tuple[Envelope, bytes] | None:
@@ -178,7 +187,8 @@ class Subscriber:
                 envelope, payload = self._read()
             except RejectedError as error:
                 self._reject(error)
-                self._admits(COUNTED_BYTES)  # its size is not known
+                if self._guard is not None:
+                    self._admits(self._guard, COUNTED_BYTES)  # its size is not known
                 continue
             except OverwrittenError:  # the gap in the sequence counts it
                 continue
@@ -187,15 +197,14 @@ class Subscriber:
             if self.counter.epoch is None and self.topic.type is not NodeStatus:  # of a status the last one is enough
                 self.counter.from_first = file_identity(self._path) != self._found
             arrival = self.counter.accept(envelope)
-            if arrival is Arrival.NEW and not self._admits(len(payload)):
+            if arrival is Arrival.NEW:
+                if self._guard is None or self._admits(self._guard, len(payload)):
+                    return envelope, payload
                 self.counter.messages -= 1
                 self._reject(RejectedError(Reason.BUDGET, self._budget_message()))
                 if len(payload) > COUNTED_BYTES:  # a stop is looked for before the next one
                     return None
-                continue
-            if arrival is Arrival.NEW:
-                return envelope, payload
-            if arrival is Arrival.OUTDATED:
+            elif arrival is Arrival.OUTDATED:
                 self._log_rejection(RejectedError(Reason.EPOCH, self._two_publishers_message(envelope)))
         return None
 
@@ -207,7 +216,8 @@ class Subscriber:
         """
         if self.cut_off and time.monotonic() > self._cut_off_until_s:
             self.cut_off = ""
-            self._guard.reset()
+            if self._guard is not None:
+                self._guard.reset()
             self.socket.setsockopt(zmq.SUBSCRIBE, self._frame)  # the welcome reveals how much was lost
         for event in self._monitor.events():
             if event == zmq.EVENT_DISCONNECTED:
@@ -267,13 +277,13 @@ class Subscriber:
 
     def _read(self) -> tuple[Envelope, bytes]:
         """The next message, its sequence and content unchecked; raises RejectedError."""
-        socket = self.socket
-        head = socket.recv(_NOBLOCK)
+        frame = self.socket.recv(_NOBLOCK, copy=False)  # knows whether another one follows, which is costly to ask for
+        head = frame.bytes
         frames = 1
-        payload = b""
-        while socket.getsockopt(_RCVMORE):
-            payload = socket.recv(_NOBLOCK)
+        while frame.more:
+            frame = self.socket.recv(_NOBLOCK, copy=False)
             frames += 1
+        payload = frame.bytes
         if frames != 2 or not head.startswith(self._frame):
             raise RejectedError(Reason.FRAMES, f"{frames} frames, expected 2: topic and header, payload")
         envelope = unpack(head[len(self._frame) :], payload, self._schema, self.topic.max_bytes)
@@ -281,18 +291,10 @@ class Subscriber:
             payload = self._ring.read(payload, envelope, self.topic.max_bytes)
         return envelope, payload
 
-    def _decode(self, payload: bytes) -> Any:
-        return decoded(self.topic, payload, self.topic.has_checked_numbers)
-
-    def _check_times(self, envelope: Envelope) -> None:
-        if not self.topic.is_request and not envelope.has_possible_times:
-            times = f"published at {envelope.published_ns} ns, captured at {envelope.captured_ns} ns"
-            raise RejectedError(Reason.NUMBER, f"{times}: at most {LATEST_NS} ns expected")
-
-    def _admits(self, n_bytes: int) -> bool:
+    def _admits(self, guard: FloodGuard, n_bytes: int) -> bool:
         """Whether a message that has just arrived is within the topic's limit; cuts off a publisher that floods."""
-        admitted = self._guard.admits(n_bytes)
-        if self._guard.floods and not self.cut_off:
+        admitted = guard.admits(n_bytes)
+        if guard.floods and not self.cut_off:
             self._cut_off_until_s = time.monotonic() + CUT_OFF_S
             self.cut_off = (
                 f"{holder_of(self._path) or 'its publisher'} floods {self.name} and is cut off for {CUT_OFF_S:g} s"

@@ -11,6 +11,7 @@ import re
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -83,7 +84,7 @@ class Topic:
     limit_hz: float | None = None
     max_points: int | None = None
 
-    @property
+    @cached_property
     def type_name(self) -> str:
         """Full protobuf name of the message type."""
         return str(self.type.DESCRIPTOR.full_name)
@@ -105,7 +106,7 @@ class Topic:
             return "nodes of the run"
         return ""
 
-    @property
+    @cached_property
     def is_request(self) -> bool:
         """Whether it carries requests to stop or to arm, which count whatever time their sender has written into them.
 
@@ -113,7 +114,7 @@ class Topic:
         """
         return self.type in (StopRequest, ArmRequest)
 
-    @property
+    @cached_property
     def has_checked_numbers(self) -> bool:
         """Whether a message with unsound numbers is rejected by its subscribers.
 
