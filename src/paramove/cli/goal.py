@@ -23,7 +23,8 @@ def send(
     content: Annotated[
         str,
         typer.Argument(
-            help="a paramove.msgs.RelocationGoal in YAML, such as '{kind: KIND_REST, frame: arm_base}' for a servo arm"
+            help="a paramove.msgs.RelocationGoal in YAML. For a servo arm '{kind: KIND_OFFER_HAND, frame: arm_base, "
+            "from: {x: 0.2, y: 0.0, z: 0.1}}' reaches a position, '{kind: KIND_REST, frame: arm_base}' goes back"
         ),
     ],
     domain: DomainOption = None,

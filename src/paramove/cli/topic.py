@@ -107,7 +107,7 @@ def echo(
     most = 1 if once else count
     messages = 0
     if not inspection.publisher_of(folder, topic).alive:
-        typer.echo(f"{topic.name} has no publisher yet; waits for one", err=True)
+        typer.echo(f"{topic.name} has no publisher yet in the domain {folder.name}; waits for one", err=True)
     with contextlib.suppress(KeyboardInterrupt):
         for received in inspection.listen(folder, [topic], math.inf if seconds is None else seconds):
             messages += 1
