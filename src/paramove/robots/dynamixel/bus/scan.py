@@ -247,6 +247,9 @@ def _older_servos(chain: ServoChain) -> list[OlderServo]:
                 found.append(OlderServo(number, model_number, chain.port.baud_rate))
     finally:
         chain.port.latency_s = latency_s
+    if found:  # the echo of the first ping may have been late: asked again, and waited for as long as for any reply
+        _, result, _ = Protocol1PacketHandler().ping(chain.port, NOBODYS_ID)
+        return [] if result == COMM_SUCCESS else found
     return found
 
 
