@@ -1,7 +1,7 @@
 """ROS 2: publishes the run there, and takes goals and stops from there; it arms nothing.
 
 Subscribes  arm/joint_states, arm/joint_states/fast, arm/safety, camera images, gestures/scene, action/scene,
-            every node's status; in all namespaces
+            relocation/status, every node's status; in all namespaces
 Publishes   nothing itself: a stop and a goal from ROS are published as those of any program outside of the run
 """
 
@@ -12,7 +12,8 @@ from paramove.dashboard import subscribe_to_nodes
 from paramove.ros2 import Ros2Bridge
 
 ARM = (topics.ARM_JOINT_STATES, topics.ARM_JOINT_STATES_FAST, topics.ARM_SAFETY)
-SUBSCRIBES = (*ARM, topics.CAMERA_IMAGE, *topics.CAMERA_IMAGES, topics.GESTURES_SCENE, topics.ACTION_SCENE)
+SEEN = (topics.CAMERA_IMAGE, *topics.CAMERA_IMAGES, topics.GESTURES_SCENE, topics.ACTION_SCENE)
+SUBSCRIBES = (*ARM, *SEEN, topics.RELOCATION_STATUS)
 PUBLISHES = ()
 
 

@@ -1,7 +1,7 @@
 """A program of ROS 2 that knows nothing of paramove: what it receives, it prints as lines of JSON.
 
 It waits for joint states of an arm that may move, sends the hand to a place, waits for the end of that, stops the arm,
-and waits until the diagnostics report so.
+and waits until the diagnostics report so. With `--leave` it ends once the arm moves.
 """
 
 import json
@@ -53,6 +53,13 @@ def main():
     goal.pose.position.x, goal.pose.position.y, goal.pose.position.z = PLACE
     until(lambda: goals.get_subscription_count() > 0, 10)
     goals.publish(goal)
+    if "--leave" in sys.argv:
+        begin = received["joint_states"][-1].position
+        until(
+            lambda: max(abs(a - b) for a, b in zip(begin, received["joint_states"][-1].position, strict=True)) > 0.1, 30
+        )
+        rclpy.shutdown()
+        return
     until(lambda: received["goal_status"], 120)
     report(received["goal_status"][0].data)
 

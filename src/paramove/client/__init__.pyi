@@ -5,6 +5,7 @@ from .parameters import parameters_of as parameters_of
 from .parameters import set_parameter as set_parameter
 from .playing import is_played as is_played
 from .playing import play as play
+from .run import LAST_STATES as LAST_STATES
 from .run import NoMessageError as NoMessageError
 from .run import NotConnectedError as NotConnectedError
 from .run import Run as Run

@@ -29,7 +29,7 @@ from paramove.operator import stop_arms
 _SERVE_S = 0.02
 _CLOCK_S = 2.0
 _REPEAT_S = 0.5
-_LAST_STATES = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED)
+LAST_STATES = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED)
 
 
 class NoMessageError(RuntimeError):
@@ -223,7 +223,7 @@ class Run:
                 status: RelocationStatus = received.message
                 if status.goal_id == message.id:
                     latest = status
-                    if latest.state in _LAST_STATES:
+                    if latest.state in LAST_STATES:
                         return latest
         state = RelocationStatus.State.Name(latest.state).removeprefix("STATE_").lower()
         raise NoMessageError(f"goal {message.id!r} has not ended within {timeout_s:g} s; its state is {state}")

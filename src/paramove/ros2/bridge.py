@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import logging
-import queue
 import threading
 import time
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import Any, Self
@@ -18,15 +17,14 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from paramove.bus import BusFolderError, Received, TopicTakenError, topics
-from paramove.client import NoMessageError, Run
+from paramove.client import LAST_STATES, NoMessageError, Run
 from paramove.documents import InputError
 from paramove.msgs.node_status_pb2 import NodeStatus
-from paramove.msgs.relocation_pb2 import RelocationStatus
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.operator import stop_arms
 
 NAME = "paramove"
-GOAL_TIMEOUT_S = 300.0
 STOP_TIMEOUT_S = 1.0
 DIAGNOSTICS_PERIOD_NS = 1_000_000_000
 QUEUE_LENGTH = 100
@@ -70,16 +68,19 @@ class Ros2Bridge:
         is_simulated: bool = False,
         domain_id: int | None = None,
     ) -> None:
-        self._folder, self._namespaces = folder, namespaces
+        self._folder = folder
         self._is_simulated, self._domain_id = is_simulated, domain_id
         self._publishers: dict[str, Any] = {}
         self._gates: dict[str, SafetyState] = {}
         self._nodes: dict[str, NodeStatus] = {}
         self._has_fast: set[str] = set()
         self._diagnosed_ns = 0
+        self._open = contextlib.ExitStack()
         self._ends = threading.Event()
-        self._goals: dict[str, queue.Queue[Any]] = {}
-        self._threads: list[threading.Thread] = []
+        self._thread = threading.Thread(target=self._spin)
+        self._runs = {namespace: Run(folder, f"{NAME}_ros2", namespace) for namespace in namespaces}
+        self._goals: dict[str, RelocationGoal] = {}  # those that have not ended, by namespace
+        self._accepted: set[str] = set()  # their ids, once they need not be repeated
 
     def __enter__(self) -> Self:
         """Joins ROS. Raises MissingRos2Error."""
@@ -97,24 +98,23 @@ class Ros2Bridge:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._node.create_subscription(Empty, "/stop", self._stop, 10)
-        for namespace in self._namespaces:
-            self._goals[namespace] = queue.Queue(maxsize=1)
+        for namespace, run in self._runs.items():
+            self._open.enter_context(run)
             self._node.create_subscription(
                 PoseStamped, _in_ros(namespace, "goal_pose"), self._goal_taken_in(namespace), 10
             )
-            self._start(partial(self._send_goals, namespace))
-        self._start(self._spin)
+        self._thread.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._ends.set()
-        for thread in self._threads:
-            thread.join()
+        self._thread.join()
         self._executor.shutdown()
         self._node.destroy_node()
         self._context.try_shutdown()
+        self._open.close()
 
     def handle(self, received: Received) -> None:
         """Publishes a message of the run to ROS; one of a topic without a counterpart there is left out."""
@@ -132,6 +132,8 @@ class Ros2Bridge:
             self._publish(ros_name, self._messages.image(message, stamp))
         elif isinstance(message, SceneUpdate):
             self._publish(_in_ros(namespace, name), self._messages.markers(message, stamp))
+        elif isinstance(message, RelocationStatus):
+            self._follow(namespace, message)
         elif isinstance(message, NodeStatus):
             self._nodes[message.node] = message
         elif isinstance(message, SafetyState):
@@ -141,7 +143,10 @@ class Ros2Bridge:
                 self._diagnosed_ns = 0
 
     def tick(self, now_ns: int) -> None:
-        """Publishes simulated time, and the diagnostics where they are due."""
+        """Publishes simulated time, goals that nobody has accepted yet, and the diagnostics where they are due."""
+        for namespace, goal in list(self._goals.items()):
+            if goal.id not in self._accepted:
+                self._send(namespace, goal)
         if self._is_simulated:
             self._publish("/clock", self._messages.clock(now_ns))
         if not self._diagnosed_ns or now_ns - self._diagnosed_ns >= DIAGNOSTICS_PERIOD_NS:
@@ -161,11 +166,6 @@ class Ros2Bridge:
             self._publishers[name] = self._node.create_publisher(type(message), name, depth)
         self._publishers[name].publish(message)
 
-    def _start(self, work: Callable[[], None]) -> None:
-        thread = threading.Thread(target=work)
-        thread.start()
-        self._threads.append(thread)
-
     def _spin(self) -> None:
         while not self._ends.is_set():
             self._executor.spin_once(timeout_sec=0.1)
@@ -183,28 +183,33 @@ class Ros2Bridge:
 
     def _goal_taken_in(self, namespace: str) -> Callable[[Any], None]:
         def take(pose: Any) -> None:
-            try:
-                self._goals[namespace].put_nowait(self._messages.goal(pose))
-            except queue.Full:
-                self._publish_status(namespace, "REJECTED", "another goal waits already")
+            if namespace in self._goals:
+                self._publish_status(namespace, "REJECTED", "another goal is under way")
+                return
+            goal: RelocationGoal = self._messages.goal(pose)
+            goal.id = f"{NAME}_ros2 {time.monotonic_ns()}"
+            self._goals[namespace] = goal  # the next tick sends it
 
         return take
 
-    def _send_goals(self, namespace: str) -> None:
-        """Sends the goals of a namespace, one after the other, on a connection of its own."""
-        while not self._ends.is_set():
-            try:
-                goal = self._goals[namespace].get(timeout=0.1)
-            except queue.Empty:
-                continue
-            try:
-                with Run(self._folder, f"{NAME}_ros2", namespace) as run:
-                    status = run.send_goal(goal, GOAL_TIMEOUT_S)
-            except (TopicTakenError, NoMessageError, InputError) as error:
-                self._publish_status(namespace, "REJECTED", str(error))
-                continue
-            state = RelocationStatus.State.Name(status.state).removeprefix("STATE_")
-            self._publish_status(namespace, state, status.reason)
+    def _send(self, namespace: str, goal: RelocationGoal) -> None:
+        try:
+            self._runs[namespace].publish(topics.RELOCATION_GOAL, goal, wait_s=0.0)
+        except (TopicTakenError, NoMessageError, InputError) as error:
+            del self._goals[namespace]
+            self._publish_status(namespace, "REJECTED", str(error))
+
+    def _follow(self, namespace: str, status: RelocationStatus) -> None:
+        goal = self._goals.get(namespace)
+        if goal is None or status.goal_id != goal.id:
+            return
+        self._accepted.add(goal.id)
+        if status.state in LAST_STATES:
+            del self._goals[namespace]
+            self._accepted.remove(goal.id)
+            self._publish_status(
+                namespace, RelocationStatus.State.Name(status.state).removeprefix("STATE_"), status.reason
+            )
 
     def _publish_status(self, namespace: str, state: str, reason: str) -> None:
         text = self._messages.text(json.dumps({"state": state, "reason": reason}))
